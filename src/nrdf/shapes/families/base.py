@@ -149,9 +149,12 @@ class Part:
     Section coordinates are (p, q) = the next two axes in cyclic order: axis x has (y, z), axis y
     has (z, x), axis z has (x, y). `centre` is the section's centre (p, q) along s.
 
-    Faces: SIDE has u around the section and v = s; CAP_START and CAP_STOP have u around and
-    v = the fraction from the section's centre to its boundary; a window's wall has u around the
-    window and v through the thickness from -q to +q.
+    `station` maps (u, v) of the SIDE to s, rising in v from 0 to 1 for every u: it lets v stand for
+    a place that means the same on every member (a windscreen's base) wherever it lies on this one.
+
+    Faces: SIDE has u around the section and v = s (or station); CAP_START and CAP_STOP have u
+    around and v = the fraction from the section's centre to its boundary; a window's wall has u
+    around the window and v through the thickness from -q to +q.
     """
 
     slot: str
@@ -162,6 +165,7 @@ class Part:
     centre: tuple[Curve, Curve] = (0.0, 0.0)
     windows: tuple[Window, ...] = ()
     maps: tuple[Map, ...] = ()
+    station: Callable[[Array, Array], Array] | None = None
 
     def mapped(self, *maps: Map, slot: str | None = None) -> Part:
         """This part with further maps, and another slot where given."""
@@ -215,7 +219,10 @@ class Part:
             low, high = self.section.chord(np.clip(xi, -1, 1), np.clip(s, 0, 1))
             return xi * self.section.half_width(np.clip(s, 0, 1)), low + v * (high - low), s
         ones = np.ones_like(u)
-        rho, s = (ones, v) if face == SIDE else (v, ones * (face == CAP_STOP))
+        if face == SIDE:
+            rho, s = ones, v if self.station is None else self.station(u, v)
+        else:
+            rho, s = v, ones * (face == CAP_STOP)
         return *self.section.disc(u, rho, s), s
 
     def _window(self, face: int) -> Window:
