@@ -1,0 +1,78 @@
+"""The interface that every field has, whatever network is behind it.
+
+A field is trained for one category. It embeds a shape (z), describes points on it (k, the
+descriptor function θ of the paper), and finds the point of another shape that a descriptor
+belongs to (C, the inverse descriptor function).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, NamedTuple
+
+from pydantic import BaseModel, ConfigDict
+from torch import Tensor, nn
+
+
+class FieldConfig(BaseModel):
+    """Base of a preset's sizes; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Inverse(NamedTuple):
+    """What the inverse descriptor function says about m descriptors on each of b targets."""
+
+    points: Tensor
+    """(b, m, 3) canonical coordinates on the target."""
+    normals: Tensor | None = None
+    """(b, m, 3) unit outward normals there, when the field predicts them."""
+    existence: Tensor | None = None
+    """(b, m) logits: does the target have such a place at all?"""
+    log_error: Tensor | None = None
+    """(b, m) logarithm of the error that the field expects of `points`."""
+
+
+class Field(nn.Module, ABC):
+    """Shape embedding, descriptor field and inverse descriptor function of one category.
+
+    A subclass names its `preset`, gives its sizes as a `Config`, and builds itself from one. The
+    names of its direct children are the parts that a training stage can freeze.
+    """
+
+    preset: ClassVar[str]
+    Config: ClassVar[type[FieldConfig]]
+
+    def __init__(self, config: FieldConfig | None = None) -> None:
+        super().__init__()
+        self.config: Any = config if config is not None else self.Config()
+
+    @abstractmethod
+    def embed(self, points: Tensor, normals: Tensor) -> Tensor:
+        """Shape embedding z (b, d_z) of points (b, n, 3) with unit outward normals (b, n, 3)."""
+
+    @abstractmethod
+    def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
+        """Logits (b, q) that queries (b, q, 3) lie inside the shapes of embeddings z (b, d_z)."""
+
+    @abstractmethod
+    def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> Tensor:
+        """Descriptors k (b, m, d_k) of points (b, m, 3) with normals on the shapes of z (b, d_z)."""
+
+    @abstractmethod
+    def invert(self, z: Tensor, k: Tensor) -> Inverse:
+        """The points on the shapes of z (b, d_z) that descriptors k (b, m, d_k) belong to."""
+
+    def transfer(
+        self, z_reference: Tensor, points: Tensor, normals: Tensor, z_target: Tensor
+    ) -> Inverse:
+        """The points of targets that correspond to points (b, m, 3) of references.
+
+        Equal to `invert(z_target, describe(z_reference, points, normals))`; a field overrides it
+        where the two together can be computed more cheaply.
+        """
+        return self.invert(z_target, self.describe(z_reference, points, normals))
+
+    def parts(self) -> dict[str, nn.Module]:
+        """The direct children by name: what a training stage can train or freeze."""
+        return dict(self.named_children())

@@ -1,0 +1,187 @@
+"""What a training run is, as data: read from YAML, checked, saved beside the results."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from nrdf.errors import ConfigError
+
+
+class Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AugmentConfig(Strict):
+    """Random changes of the shapes; 0 switches one off."""
+
+    scaling: float = Field(0.0, ge=0)
+    """Standard deviation of the logarithm of each axis's scale."""
+    warp: float = Field(0.0, ge=0)
+    """Standard deviation of each of the low-frequency waves' displacement (canonical lengths)."""
+    mirror: bool = False
+    """Mirror left and right, both shapes of a pair alike."""
+    density: float = Field(0.0, ge=0)
+    """Largest standard deviation of the logarithm of the encoder points' density."""
+    noise: float = Field(0.0, ge=0)
+    """Largest standard deviation of the encoder points' noise (canonical lengths)."""
+    normal_noise: float = Field(0.0, ge=0)
+    """Largest standard deviation added to each coordinate of the encoder's normals."""
+    holes: int = Field(0, ge=0)
+    hole_radius: float = Field(0.1, ge=0)
+
+
+class DataConfig(Strict):
+    """How many points of what a batch holds, and which shapes meet in it."""
+
+    encoder_points: int = Field(1024, ge=1)
+    queries: int = Field(256, ge=0)
+    """Occupancy queries a shape."""
+    correspondences: int = Field(256, ge=0)
+    """Corresponding points a pair."""
+    rolls: int = Field(1, ge=1)
+    """Partners that each encoded shape is paired with: the next, the one after it, ..."""
+    cloud_points: int = Field(1024, ge=2)
+    """Points a shape for the losses on whole clouds (self, chamfer, emd, ...)."""
+    surface_points: int = Field(8192, ge=1)
+    """Surface points a shape kept in memory to draw from."""
+    stored_queries: int = Field(20000, ge=1)
+    pools: dict[str, float] = {}
+    """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
+    within a pool. Empty: one pool of all shapes."""
+    exact_groups: list[str] = ["family-*", "gsnet"]
+    """Patterns of correspondence groups whose weight 0 is a fact ("no such place"), not a doubt."""
+    weight_threshold: float = Field(0.05, ge=0, le=1)
+    """Correspondences of less confidence are not drawn."""
+    augment: AugmentConfig = AugmentConfig()
+
+
+class Stage(Strict):
+    """A stretch of training: which losses at which weights, which parts train, for how long."""
+
+    name: str
+    weights: dict[str, float] = Field(min_length=1)
+    """Loss name to weight (`nrdf.training.losses.LOSSES`)."""
+    epochs: float | None = Field(None, gt=0)
+    steps: int | None = Field(None, gt=0)
+    batch_size: int = Field(8, ge=2)
+    """Shapes a step, on each process."""
+    parts: list[str] | Literal["all"] = "all"
+    """Names of the field's parts that train; the others are frozen."""
+    rate: float = Field(1e-4, gt=0)
+    schedule: Literal["constant", "cosine"] = "constant"
+    warmup: int = Field(0, ge=0)
+    """Steps over which the rate rises linearly from zero."""
+
+    @field_validator("weights")
+    @classmethod
+    def _known_losses(cls, weights: dict[str, float]) -> dict[str, float]:
+        from nrdf.training.losses import LOSSES
+
+        for name in weights:
+            if name not in LOSSES:
+                raise ValueError(f"no loss '{name}'{_nearest(name, LOSSES)}")
+        return weights
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Stage:
+        if (self.epochs is None) == (self.steps is None):
+            raise ValueError("give either epochs or steps")
+        return self
+
+
+class OptimizerConfig(Strict):
+    name: Literal["adam", "adamw"] = "adam"
+    betas: tuple[float, float] = (0.9, 0.999)
+    weight_decay: float = Field(0.0, ge=0)
+    clip: float | None = Field(None, gt=0)
+    """Bound on the gradient's norm."""
+
+
+class TrainConfig(Strict):
+    """One training run, except for the data folders, the category and the device."""
+
+    preset: str
+    field: dict[str, Any] = {}
+    """Sizes that differ from the preset's."""
+    stages: list[Stage] = Field(min_length=1)
+    data: DataConfig = DataConfig()
+    optimizer: OptimizerConfig = OptimizerConfig()
+    seed: int = Field(0, ge=0)
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """auto: bfloat16 where it pays (CUDA; CPUs with AMX)."""
+    ema: float | None = Field(None, gt=0, lt=1)
+    """Decay of the moving average of the weights, which is what is exported; None: no average."""
+    checkpoint_every: int = Field(500, ge=1)
+    validate_every: int = Field(500, ge=1)
+    log_every: int = Field(20, ge=1)
+
+
+CONFIG_FOLDER = Path(__file__).resolve().parents[3] / "configs"
+
+
+def load_config(source: str | Path | Mapping[str, Any]) -> TrainConfig:
+    """A training configuration from a YAML file, a preset's name (its file in `configs/`), or a
+    mapping.
+
+    Raises ConfigError for a file that is missing or no YAML mapping, unknown keys (naming the
+    nearest known one) and values out of range.
+    """
+    if isinstance(source, Mapping):
+        return _validated(source, "configuration")
+    path = Path(source)
+    if not path.exists() and path.suffix == "" and path.name == str(source):
+        path = CONFIG_FOLDER / f"{source}.yaml"
+    if not path.is_file():
+        known = sorted(file.stem for file in CONFIG_FOLDER.glob("*.yaml"))
+        raise ConfigError(
+            f"no configuration file '{source}'; give a YAML file or one of: {', '.join(known)}"
+        )
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not valid YAML: {error}") from None
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path} must hold a mapping (preset: …, stages: […], …)")
+    return _validated(content, str(path))
+
+
+def _validated(content: Mapping[str, Any], origin: str) -> TrainConfig:
+    try:
+        return TrainConfig.model_validate(dict(content))
+    except ValidationError as error:
+        lines = [_explain(dict(item)) for item in error.errors()]
+        raise ConfigError(f"{origin}: " + "; ".join(lines)) from None
+
+
+def _explain(item: dict[str, Any]) -> str:
+    """One pydantic complaint in words, with the nearest known name for an unknown key."""
+    where = ".".join(str(part) for part in item["loc"])
+    if item["type"] == "extra_forbidden":
+        return f"unknown key '{where}'{_nearest(str(item['loc'][-1]), _keys_at(item['loc'][:-1]))}"
+    return f"{where}: {item['msg'].removeprefix('Value error, ')}"
+
+
+def _keys_at(location: tuple[Any, ...]) -> list[str]:
+    """The keys that are known at a place in the configuration."""
+    places: dict[str, type[BaseModel]] = {
+        "stages": Stage,
+        "data": DataConfig,
+        "augment": AugmentConfig,
+        "optimizer": OptimizerConfig,
+    }
+    names = [part for part in location if isinstance(part, str) and part in places]
+    model = places[names[-1]] if names else TrainConfig
+    return list(model.model_fields)
+
+
+def _nearest(name: str, known: Any) -> str:
+    names = list(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"; did you mean '{close[0]}'?" if close else ""
+    return f"{hint} (known: {', '.join(names)})"

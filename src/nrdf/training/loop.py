@@ -1,0 +1,375 @@
+"""The one training loop, for every preset."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import logging
+import math
+import platform
+import signal
+import subprocess
+import threading
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
+
+from nrdf.errors import ConfigError, DataError, TrainingError, unknown_name
+from nrdf.field import build_field
+from nrdf.field.base import Field
+from nrdf.field.weights import save_weights
+from nrdf.training.checkpoint import (
+    Position,
+    latest_checkpoint,
+    load_field_state,
+    load_optimizer_state,
+    open_run,
+    read_position,
+    save_checkpoint,
+    write_identity,
+)
+from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
+from nrdf.training.data import Bank, Batch, Entry, load_bank, read_index, seeded
+from nrdf.training.distributed import Workers, choose_precision, join_workers
+from nrdf.training.losses import LOSSES, Forward
+from nrdf.training.progress import Display
+from nrdf.training.validation import validate
+
+log = logging.getLogger(__name__)
+
+MAX_SKIPPED = 5
+"""Steps without a finite gradient, one after the other, before a run gives up."""
+
+
+def train(
+    config: TrainConfig,
+    data: Sequence[str | Path],
+    out: str | Path,
+    *,
+    category: str,
+    device: str = "auto",
+    overwrite: bool = False,
+) -> Path:
+    """Train a field for one category and export its weights; returns the weight file's path.
+
+    `data` are folders with an `index.csv`, `out` is the run's folder. Started again with the same
+    arguments after whatever ended it, a run goes on from its newest checkpoint, to the same
+    weights, bit by bit, that it would have reached undisturbed (on the same device, with as many
+    threads and processes).
+
+    Raises ConfigError, DataError (no shapes, another category), OutputError (the folder holds
+    something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
+    """
+    out = Path(out)
+    with join_workers(device) as workers:
+        entries = read_index([Path(folder) for folder in data])
+        bank = load_bank(entries, "train", config.data, workers.device)
+        if bank.categories != {category}:
+            raise DataError(
+                f"the shapes are of category {', '.join(sorted(bank.categories))}, not {category}"
+            )
+        validation = None
+        if workers.first and any(entry.split == "val" for entry in entries):
+            validation = load_bank(entries, "val", config.data, workers.device)
+        if workers.first:
+            identity = {
+                "config": config.model_dump(mode="json"),
+                "category": category,
+                "shapes": sorted(bank.names),
+            }
+            if not open_run(out, identity, overwrite):
+                write_identity(out, identity, environment(workers))
+        workers.wait()
+        field, scores = run_stages(config, bank, out, workers, validation)
+        path = out / "weights.safetensors"
+        if workers.first:
+            save_weights(
+                path,
+                field,
+                {
+                    "category": category,
+                    "train": config.model_dump(mode="json"),
+                    "shapes": provenance(entries),
+                    "scores": scores,
+                    "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+                    **environment(workers),
+                },
+            )
+            log.info("wrote %s", path)
+        workers.wait()
+    return path
+
+
+def run_stages(
+    config: TrainConfig, bank: Bank, out: Path, workers: Workers, validation: Bank | None
+) -> tuple[Field, dict[str, float]]:
+    """All stages from wherever the run stands; the field to export (the average, if one is kept)
+    and its scores on the validation shapes."""
+    torch.manual_seed(config.seed)
+    field = build_field(config.preset, config.field).to(workers.device)
+    check_parts(config, field)
+    lengths = [stage_steps(stage, bank, workers.world) for stage in config.stages]
+    precision = choose_precision(config.precision, workers.device)
+
+    checkpoint = latest_checkpoint(out)
+    position = Position() if checkpoint is None else read_position(checkpoint)
+    average = None if checkpoint is None else load_field_state(checkpoint, field)
+    if config.ema is not None:
+        average = _to(average or field.state_dict(), workers.device)
+    if checkpoint is not None:
+        log.info("going on from step %d of %d", position.total, sum(lengths))
+
+    with (
+        Display(out, sum(lengths), position.total, workers.first) as display,
+        deferred_interrupt(workers.world == 1) as interrupted,
+    ):
+        for number, (stage, length) in enumerate(zip(config.stages, lengths, strict=True)):
+            if number < position.stage:
+                continue
+            if position.stage < number:
+                position, checkpoint = Position(number, 0, position.total), None
+            parameters = select_parts(field, stage)
+            optimizer = make_optimizer(parameters, stage, config.optimizer)
+            if checkpoint is not None:
+                load_optimizer_state(checkpoint, optimizer)
+            objective: nn.Module = Objective(field, stage, config, precision)
+            if workers.world > 1:
+                objective = DistributedDataParallel(objective, find_unused_parameters=True)
+            sums, counted, skipped = defaultdict(float), 0, 0
+
+            for step in range(position.step, length):
+                seed = config.seed + 7919 * number
+                batch = bank.batch(stage.batch_size, seed, step, workers.rank, workers.world)
+                # Dropout and the like draw from the global generator.
+                torch.manual_seed(config.seed * 1_000_003 + position.total)
+                generator = seeded(workers.device, seed, step, workers.rank, 1)
+                for group in optimizer.param_groups:
+                    group["lr"] = learning_rate(stage, step, length)
+
+                total, terms = objective(batch, generator)
+                optimizer.zero_grad(set_to_none=True)
+                total.backward()
+                norm = nn.utils.clip_grad_norm_(parameters, config.optimizer.clip or math.inf)
+                # The norm is of gradients averaged over processes: all of them decide alike.
+                if math.isfinite(norm.item()):
+                    optimizer.step()
+                    skipped = 0
+                else:
+                    skipped += 1
+                    log.warning("%s", not_finite(stage, position.total, terms))
+                    if skipped >= MAX_SKIPPED:
+                        raise TrainingError(
+                            f"{not_finite(stage, position.total, terms)}, and so were the "
+                            f"{MAX_SKIPPED - 1} steps before; lower the stage's rate, set "
+                            "optimizer.clip, or use precision: float32"
+                        )
+                if average is not None and config.ema is not None:
+                    update_average(average, field, config.ema, position.total)
+
+                position = Position(number, step + 1, position.total + 1)
+                last = step + 1 == length
+                counted += 1
+                for name, value in terms.items():
+                    sums[name] = sums[name] + value
+                if position.total % config.log_every == 0 or last:
+                    means = {f"loss/{name}": float(v) / counted for name, v in sums.items()}
+                    means["rate"] = optimizer.param_groups[0]["lr"]
+                    display.report(stage.name, position.total, means)
+                    sums, counted = defaultdict(float), 0
+                if validation is not None and position.total % config.validate_every == 0:
+                    with averaged(field, average):
+                        scores = validate(field, validation)
+                    display.report(stage.name, position.total, scores)
+                if workers.first and (
+                    position.total % config.checkpoint_every == 0 or last or interrupted.is_set()
+                ):
+                    save_checkpoint(out, position, field, optimizer, average)
+                if interrupted.is_set():
+                    raise KeyboardInterrupt
+
+    if average is not None:
+        field.load_state_dict(average)
+    field.requires_grad_(True).eval()
+    return field, validate(field, validation) if validation is not None else {}
+
+
+class Objective(nn.Module):
+    """The weighted sum of a stage's losses, as a module so that processes can share it."""
+
+    def __init__(
+        self, field: Field, stage: Stage, config: TrainConfig, precision: torch.dtype
+    ) -> None:
+        super().__init__()
+        self.field = field
+        self._weights = stage.weights
+        self._cloud_points = config.data.cloud_points
+        self._precision = precision
+
+    def forward(
+        self, batch: Batch, generator: torch.Generator
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """The sum () with gradient, and every loss () before weighting, without."""
+        device = batch.points.device.type
+        with torch.autocast(device, self._precision, self._precision != torch.float32):
+            forward = Forward(self.field, batch, generator, self._cloud_points)
+            terms = {name: LOSSES[name](forward) for name in self._weights}
+        total = torch.stack([w * terms[name].float() for name, w in self._weights.items()]).sum()
+        return total, {
+            "total": total.detach(),
+            **{name: value.detach().float() for name, value in terms.items()},
+        }
+
+
+def stage_steps(stage: Stage, bank: Bank, world: int) -> int:
+    """How many steps a stage has."""
+    if stage.steps is not None:
+        return stage.steps
+    assert stage.epochs is not None
+    return max(1, round(stage.epochs * bank.steps_per_epoch(stage.batch_size, world)))
+
+
+def learning_rate(stage: Stage, step: int, length: int) -> float:
+    """The rate at a step of a stage."""
+    rate = stage.rate * min(1.0, (step + 1) / (stage.warmup + 1))
+    if stage.schedule == "cosine":
+        rate *= 0.5 * (1 + math.cos(math.pi * step / length))
+    return rate
+
+
+def check_parts(config: TrainConfig, field: Field) -> None:
+    """ConfigError for a stage that trains a part which the field does not have."""
+    for stage in config.stages:
+        for name in [] if stage.parts == "all" else stage.parts:
+            if name not in field.parts():
+                raise ConfigError(
+                    f"stage '{stage.name}': {unknown_name('part', name, list(field.parts()))}"
+                )
+
+
+def select_parts(field: Field, stage: Stage) -> list[nn.Parameter]:
+    """Freeze the parts that the stage does not train; the parameters of the others."""
+    field.train()
+    for name, part in field.parts().items():
+        trains = stage.parts == "all" or name in stage.parts
+        part.requires_grad_(trains).train(trains)
+    return [parameter for parameter in field.parameters() if parameter.requires_grad]
+
+
+def make_optimizer(
+    parameters: list[nn.Parameter], stage: Stage, config: OptimizerConfig
+) -> torch.optim.Optimizer:
+    """A fresh optimizer, as every stage starts with."""
+    kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
+    return kind(parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay)
+
+
+@torch.no_grad()
+def update_average(average: dict[str, Tensor], field: nn.Module, decay: float, step: int) -> None:
+    """Move the average towards the field's weights; faster at first, while it knows little."""
+    decay = min(decay, (1 + step) / (10 + step))
+    floating, towards = [], []
+    for name, value in field.state_dict().items():
+        if value.is_floating_point():
+            floating.append(average[name])
+            towards.append(value)
+        else:
+            average[name].copy_(value)
+    torch._foreach_lerp_(floating, towards, 1 - decay)
+
+
+@contextmanager
+def averaged(field: nn.Module, average: dict[str, Tensor] | None) -> Iterator[None]:
+    """The field with averaged weights, for a while."""
+    if average is None:
+        yield
+        return
+    current = _to(field.state_dict(), None)
+    field.load_state_dict(average)
+    try:
+        yield
+    finally:
+        field.load_state_dict(current)
+
+
+@contextmanager
+def deferred_interrupt(enabled: bool) -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C (or SIGTERM) sets, so that a run can stop between two steps
+    with a checkpoint; a second one interrupts at once."""
+    event = threading.Event()
+    if not enabled or threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def stop(number: int, frame: Any) -> None:
+        if event.is_set():
+            raise KeyboardInterrupt
+        event.set()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield event
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def not_finite(stage: Stage, step: int, terms: dict[str, Tensor]) -> str:
+    """Which step had no finite gradient, and which losses were to blame."""
+    blamed = [name for name, value in terms.items() if not math.isfinite(float(value))]
+    return (
+        f"step {step} (stage '{stage.name}') had no finite gradient and changed nothing; "
+        f"not finite: {', '.join(blamed) or 'none of the losses, only a derivative'}"
+    )
+
+
+def provenance(entries: Sequence[Entry]) -> dict[str, dict[str, Any]]:
+    """Number and licences of the training shapes by source."""
+    found: dict[str, dict[str, Any]] = {}
+    for entry in entries:
+        if entry.split == "train":
+            at = found.setdefault(entry.source, {"count": 0, "licences": {}})
+            at["count"] += 1
+            at["licences"][entry.licence] = at["licences"].get(entry.licence, 0) + 1
+    return found
+
+
+def environment(workers: Workers) -> dict[str, Any]:
+    """Versions, device and git commit that a result comes from."""
+    return {
+        "versions": {
+            "python": platform.python_version(),
+            "nrdf": importlib.metadata.version("nrdf"),
+            "torch": torch.__version__,
+        },
+        "device": torch.cuda.get_device_name(workers.device)
+        if workers.device.type == "cuda"
+        else f"cpu, {torch.get_num_threads()} threads",
+        "processes": workers.world,
+        "commit": git_commit(),
+    }
+
+
+def git_commit() -> str | None:
+    """The commit of the checkout that this code runs from; None outside of one."""
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip()
+
+
+def _to(state: dict[str, Tensor], device: torch.device | None) -> dict[str, Tensor]:
+    return {name: value.detach().to(device, copy=True) for name, value in state.items()}

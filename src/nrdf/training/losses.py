@@ -1,0 +1,221 @@
+"""The paper's seven losses, and those that use known correspondences.
+
+Equation numbers are the paper's: (3) is the Chamfer distance and (7) the descriptor distance; the
+others follow from the order in which the paper's third stage lists its losses.
+
+Every loss is a function of a `Forward`: a batch and what the field makes of it, each part computed
+once, when a loss first asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from nrdf.field.base import Field, Inverse
+from nrdf.training.data import Batch
+from nrdf.training.matching import (
+    assign,
+    distances,
+    gather,
+    local_normals,
+    nearest_distance,
+    nearest_indices,
+)
+
+ROBUST = 0.01
+"""Distance (canonical) below which `correspondence` turns from linear to quadratic."""
+
+
+class Forward:
+    """A batch and what the field makes of it."""
+
+    def __init__(
+        self, field: Field, batch: Batch, generator: torch.Generator, cloud_points: int = 1024
+    ) -> None:
+        self.field = field
+        self.batch = batch
+        self.generator = generator
+        self.cloud_points = min(cloud_points, batch.points.shape[1])
+
+    @cached_property
+    def z(self) -> Tensor:
+        """(b, d_z) shape embeddings."""
+        return self.field.embed(self.batch.points, self.batch.normals)
+
+    @cached_property
+    def logits(self) -> Tensor:
+        """(b, q) occupancy of the queries."""
+        return self.field.occupancy(self.z, self.batch.queries).float()
+
+    @cached_property
+    def match(self) -> Inverse:
+        """The pairs' source points carried to the partner: points (p, m, 3)."""
+        batch = self.batch
+        return self.field.transfer(
+            self.z[batch.reference], batch.source, batch.source_normals, self.z[batch.partner]
+        )
+
+    @cached_property
+    def cloud(self) -> Tensor:
+        """(b, c, 3) points of each shape for the losses on whole clouds."""
+        return self.batch.clean_points[:, : self.cloud_points]
+
+    @cached_property
+    def cloud_normals(self) -> Tensor:
+        """(b, c, 3) their normals."""
+        return self.batch.clean_normals[:, : self.cloud_points]
+
+    @cached_property
+    def descriptors(self) -> Tensor:
+        """(b, c, d_k) of the clouds' points."""
+        return self.field.describe(self.z, self.cloud, self.cloud_normals)
+
+    @cached_property
+    def partner(self) -> Tensor:
+        """(b,) every shape's first partner."""
+        return self.batch.partner[: len(self.cloud)]
+
+    @cached_property
+    def own(self) -> Tensor:
+        """(b, c, 3) self reconstruction: each cloud from its own descriptors."""
+        return self.field.invert(self.z, self.descriptors).points.float()
+
+    @cached_property
+    def cross(self) -> Tensor:
+        """(b, c, 3) cross reconstruction: each shape's descriptors on its partner."""
+        return self.field.invert(self.z[self.partner], self.descriptors).points.float()
+
+
+def chamfer_distance(a: Tensor, b: Tensor) -> Tensor:
+    """Mean squared distance to the nearest point, both directions summed: a, b (b, n|m, 3)."""
+    return (
+        nearest_distance(a, b, squared=True).mean() + nearest_distance(b, a, squared=True).mean()
+    )
+
+
+def earth_movers_distance(a: Tensor, b: Tensor) -> Tensor:
+    """Mean distance under the best bijection between a and b (b, n, 3)."""
+    difference = a - gather(b, assign(a, b))
+    return (difference.square().sum(-1) + 1e-12).sqrt().mean()
+
+
+def weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
+    """Σ w v / Σ w; zero, with zero gradient, where no weight is."""
+    return (values * weight).sum() / weight.sum().clamp_min(1e-6)
+
+
+def occupancy(f: Forward) -> Tensor:
+    """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
+    return functional.binary_cross_entropy_with_logits(f.logits, f.batch.occupancy)
+
+
+def self_reconstruction(f: Forward) -> Tensor:
+    """(2): ‖C(z_i, θ(z_i, x)) − x‖², averaged over points x of shape i."""
+    return (f.own - f.cloud).square().sum(-1).mean()
+
+
+def chamfer(f: Forward) -> Tensor:
+    """(3): Σ over both directions of the mean of min ‖x − y‖², between x in the cross
+    reconstruction C(z_j, θ(z_i, ·)) and y in shape j."""
+    return chamfer_distance(f.cross, f.cloud[f.partner])
+
+
+def emd(f: Forward) -> Tensor:
+    """(4): min over bijections φ of the mean of ‖x − φ(x)‖, from cross reconstruction to shape j;
+    the bijection by auction (eps 0.005, 50 rounds)."""
+    return earth_movers_distance(f.cross, f.cloud[f.partner])
+
+
+def descriptor_smoothness(f: Forward) -> Tensor:
+    """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
+    b, c, _ = f.cloud.shape
+    rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
+    apart, around = (
+        distances(f.cloud[:, rows], f.cloud).topk(min(17, c), dim=2, largest=False, sorted=True)
+    )
+    apart, around = apart[:, :, 1:], around[:, :, 1:]
+    k = f.descriptors.float()
+    difference = k[:, rows, None] - gather(k, around)
+    return weighted_mean((difference.square().sum(-1) + 1e-12).sqrt(), (apart < 0.1).float())
+
+
+def normal_consistency(f: Forward) -> Tensor:
+    """(6): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
+    by local PCA, its sign from the normal that x had on shape i."""
+    ours = local_normals(f.cross, towards=f.cloud_normals)
+    theirs = gather(
+        f.cloud_normals[f.partner], nearest_indices(f.cross, f.cloud[f.partner])
+    )
+    return (1 - (ours * theirs).sum(-1)).mean()
+
+
+def descriptor_distance(f: Forward) -> Tensor:
+    """(7): Chamfer distance between the descriptors of the cross reconstruction, taken on shape j,
+    and those of shape i that it was made from.
+
+    The paper writes it squared and in one direction; as in its released code the distances are
+    not squared and both directions are averaged.
+    """
+    ours = f.field.describe(f.z[f.partner], f.cross, f.cloud_normals)
+    theirs = f.descriptors
+    return (nearest_distance(ours, theirs).mean() + nearest_distance(theirs, ours).mean()) / 2
+
+
+def correspondence(f: Forward) -> Tensor:
+    """Weighted mean of √(d² + ε²) − ε, d from C(z_j, θ(z_i, x)) to the known place of x on
+    shape j; ε = 0.01 keeps doubtful correspondences from ruling (not in the paper)."""
+    square = (f.match.points.float() - f.batch.target).square().sum(-1)
+    return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, f.batch.weight)
+
+
+def normal(f: Forward) -> Tensor:
+    """Weighted mean of 1 − n̂·n, n̂ predicted at the corresponding place, n known there (not in the
+    paper). Zero for a field that predicts no normals."""
+    if f.match.normals is None:
+        return f.z.new_zeros(())
+    cosine = functional.cosine_similarity(f.match.normals.float(), f.batch.target_normals, dim=-1)
+    return weighted_mean(1 - cosine, f.batch.weight)
+
+
+def existence(f: Forward) -> Tensor:
+    """−[e log ê + (1 − e) log(1 − ê)] over the pairs with exact truth, e = 1 where the target has
+    the place at all (not in the paper). Zero for a field that predicts no existence."""
+    if f.match.existence is None:
+        return f.z.new_zeros(())
+    truth = (f.batch.weight > 0).float()
+    each = functional.binary_cross_entropy_with_logits(
+        f.match.existence.float(), truth, reduction="none"
+    )
+    return weighted_mean(each, f.batch.exact[:, None].float().expand_as(each))
+
+
+def error_scale(f: Forward) -> Tensor:
+    """Weighted mean of d/s + log s, the negative logarithm of a Laplace density of scale s, of the
+    distance d (without gradient) that `correspondence` measures; s predicted (not in the paper).
+    Zero for a field that predicts no error."""
+    if f.match.log_error is None:
+        return f.z.new_zeros(())
+    d = (f.match.points.float() - f.batch.target).norm(dim=-1).detach()
+    log_scale = f.match.log_error.float().clamp(-9, 3)
+    return weighted_mean(d * (-log_scale).exp() + log_scale, f.batch.weight)
+
+
+LOSSES: dict[str, Callable[[Forward], Tensor]] = {
+    "occupancy": occupancy,
+    "self": self_reconstruction,
+    "chamfer": chamfer,
+    "emd": emd,
+    "smoothness": descriptor_smoothness,
+    "normal_consistency": normal_consistency,
+    "descriptor_distance": descriptor_distance,
+    "correspondence": correspondence,
+    "normal": normal,
+    "existence": existence,
+    "error_scale": error_scale,
+}
+"""Loss by the name that a stage's `weights` use."""

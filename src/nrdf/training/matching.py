@@ -1,0 +1,167 @@
+"""Nearest neighbours, local normals and optimal assignment in plain PyTorch, chunked."""
+
+from __future__ import annotations
+
+import torch
+from scipy.optimize import linear_sum_assignment
+from torch import Tensor
+
+PAIRS_AT_ONCE = 1 << 24
+"""Distances held in memory at a time (64 MiB of float32)."""
+
+
+def distances(a: Tensor, b: Tensor) -> Tensor:
+    """Euclidean distances (b, n, m) between a (b, n, d) and b (b, m, d), in float32.
+
+    Few dimensions are subtracted rather than expanded into a product: exact for near points.
+    """
+    mode = "donot_use_mm_for_euclid_dist" if a.shape[-1] <= 8 else "use_mm_for_euclid_dist"
+    return torch.cdist(a.float(), b.float(), compute_mode=mode)
+
+
+def with_normals(points: Tensor, normals: Tensor, weight: float) -> Tensor:
+    """Features (x, λn) (..., 6): near in them means near in place *and* facing alike."""
+    return torch.cat([points, weight * normals], dim=-1)
+
+
+def _chunks(rows: int, columns: int, batch: int) -> list[slice]:
+    step = max(1, PAIRS_AT_ONCE // max(1, columns * batch))
+    return [slice(start, min(start + step, rows)) for start in range(0, rows, step)]
+
+
+@torch.no_grad()
+def nearest_indices(query: Tensor, reference: Tensor) -> Tensor:
+    """Index (b, n) of the nearest of reference (b, m, d) to each of query (b, n, d)."""
+    b, n, _ = query.shape
+    found = [
+        distances(query[:, rows], reference).min(dim=2).indices
+        for rows in _chunks(n, reference.shape[1], b)
+    ]
+    return torch.cat(found, dim=1)
+
+
+@torch.no_grad()
+def neighbour_indices(query: Tensor, reference: Tensor, count: int) -> Tensor:
+    """Indices (b, n, count) of the nearest `count` of reference (b, m, d), nearest first."""
+    b, n, _ = query.shape
+    found = [
+        distances(query[:, rows], reference).topk(count, dim=2, largest=False).indices
+        for rows in _chunks(n, reference.shape[1], b)
+    ]
+    return torch.cat(found, dim=1)
+
+
+def gather(values: Tensor, indices: Tensor) -> Tensor:
+    """Rows of values (b, m, d) at indices (b, ...): (b, ..., d)."""
+    flat = indices.reshape(indices.shape[0], -1, 1).expand(-1, -1, values.shape[-1])
+    return values.gather(1, flat).reshape(*indices.shape, values.shape[-1])
+
+
+def nearest_distance(query: Tensor, reference: Tensor, squared: bool = False) -> Tensor:
+    """Distance (b, n) from query (b, n, d) to its nearest in reference (b, m, d).
+
+    Which one is nearest is found without gradient; the distance to it has one, to both sides.
+    """
+    difference = query - gather(reference, nearest_indices(query, reference))
+    square = difference.float().square().sum(-1)
+    return square if squared else (square + 1e-12).sqrt()
+
+
+def local_normals(points: Tensor, neighbours: int = 16, towards: Tensor | None = None) -> Tensor:
+    """Unit normals (b, n, 3) of points (b, n, 3) from the plane through their neighbours.
+
+    The normal is the covariance's eigenvector of least eigenvalue. Its derivative is written as
+    first-order perturbation with the eigenvalue gaps bounded from below, because the derivative
+    of `eigh` is infinite where two eigenvalues meet (lines, corners). Signs are those that agree
+    with `towards` (b, n, 3), or arbitrary.
+    """
+    points = points.float()
+    indices = neighbour_indices(points, points, min(neighbours, points.shape[1]))
+    around = gather(points, indices)
+    around = around - around.mean(dim=2, keepdim=True)
+    covariance = around.transpose(2, 3) @ around
+    values, vectors = torch.linalg.eigh(covariance.detach().double())
+    values, vectors = values.float(), vectors.float()
+    normal = vectors[..., 0]
+    gap = values[..., 1:] - values[..., :1] + 0.01 * values[..., 2:] + 1e-9
+    # (b, n, 2): zero in value, but its derivative turns the normal towards the other axes.
+    turn = torch.einsum("bnij,bnjk,bni->bnk", covariance, vectors[..., 1:], normal) / gap
+    turn = turn - turn.detach()
+    normal = normal - torch.einsum("bnik,bnk->bni", vectors[..., 1:], turn)
+    if towards is not None:
+        sign = (normal.detach() * towards).sum(-1, keepdim=True)
+        normal = torch.where(sign < 0, -normal, normal)
+    return torch.nn.functional.normalize(normal, dim=-1)
+
+
+@torch.no_grad()
+def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Tensor:
+    """A bijection (b, n) from a (b, n, 3) to b (b, n, 3) of nearly least total distance.
+
+    Auction (Bertsekas 1988), all batch elements at once: every bidder without an object bids for
+    its best one, by what it is better than its second best plus `eps`; the highest bid takes the
+    object. The few left after `iterations` rounds are assigned exactly. The mean distance is
+    within `eps` of the optimum once the auction has ended.
+    """
+    count, n, _ = a.shape
+    if b.shape != a.shape:
+        raise ValueError(f"a bijection needs equal sizes; {tuple(a.shape)} and {tuple(b.shape)}")
+    if n == 1:
+        return torch.zeros(count, 1, dtype=torch.long, device=a.device)
+    cost = distances(a, b).reshape(count * n, n)
+    price = torch.zeros(count * n, device=a.device)
+    owner = torch.full((count * n,), -1, dtype=torch.long, device=a.device)
+    chosen = torch.full((count * n,), -1, dtype=torch.long, device=a.device)
+    for _ in range(iterations):
+        bidder = (chosen < 0).nonzero().squeeze(1)
+        if len(bidder) == 0:
+            break
+        element = bidder // n
+        best, wanted, margin = _best_objects(cost, price.view(count, n), bidder, element)
+        wanted = wanted + element * n
+        bid = price[wanted] + margin + eps
+        highest = torch.full_like(price, -torch.inf).scatter_reduce_(0, wanted, bid, "amax")
+        high = bid == highest[wanted]
+        winner = torch.full_like(owner, -1).scatter_reduce_(
+            0, wanted[high], bidder[high], "amax"
+        )
+        sold = winner >= 0
+        loser = owner[sold & (owner >= 0)]
+        chosen[loser] = -1
+        owner = torch.where(sold, winner, owner)
+        price = torch.where(sold, highest, price)
+        chosen[winner[sold]] = sold.nonzero().squeeze(1)
+    chosen = torch.where(chosen >= 0, chosen % n, chosen).view(count, n)
+    return _assign_rest(cost.view(count, n, n), chosen)
+
+
+def _best_objects(
+    cost: Tensor, price: Tensor, bidder: Tensor, element: Tensor
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Value and index of each bidder's best object, and its lead over the second best."""
+    parts = []
+    for rows in _chunks(len(bidder), cost.shape[1], 1):
+        value = -cost[bidder[rows]] - price[element[rows]]
+        best, wanted = value.max(dim=1)
+        value.scatter_(1, wanted[:, None], -torch.inf)
+        parts.append((best, wanted, best - value.max(dim=1).values))
+    best, wanted, margin = (torch.cat(column) for column in zip(*parts, strict=True))
+    return best, wanted, margin
+
+
+def _assign_rest(cost: Tensor, chosen: Tensor) -> Tensor:
+    """Fill the -1 entries of chosen (b, n) with the objects left, at least total cost."""
+    if bool((chosen >= 0).all()):
+        return chosen
+    n = chosen.shape[1]
+    for element in range(chosen.shape[0]):
+        bidder = (chosen[element] < 0).nonzero().squeeze(1)
+        if len(bidder) == 0:
+            continue
+        free = torch.ones(n, dtype=torch.bool, device=chosen.device)
+        free[chosen[element][chosen[element] >= 0]] = False
+        left = free.nonzero().squeeze(1)
+        rows, columns = linear_sum_assignment(cost[element][bidder][:, left].cpu().numpy())
+        order = torch.as_tensor(columns, device=chosen.device)
+        chosen[element, bidder[torch.as_tensor(rows, device=chosen.device)]] = left[order]
+    return chosen

@@ -1,0 +1,90 @@
+"""What a person sees of a training run: a bar in a terminal, log lines elsewhere, TensorBoard."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+log = logging.getLogger(__name__)
+
+
+class Display:
+    """Reports the steps of one process's run; silent when `active` is False."""
+
+    def __init__(self, run: Path, total: int, done: int, active: bool = True) -> None:
+        self._active = active
+        self._total = total
+        self._started, self._first = time.monotonic(), done
+        self._bar: Progress | None = None
+        self._board: Any = None
+        self._lines: Any = None
+        if not active:
+            return
+        self._lines = (run / "metrics.jsonl").open("a", encoding="utf-8")
+        self._board = _tensorboard(run / "tensorboard", done)
+        console = Console(stderr=True)
+        if console.is_terminal:
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TextColumn("{task.fields[numbers]}"),
+                TimeRemainingColumn(),
+                console=console,
+            )
+            self._task = self._bar.add_task("training", total=total, completed=done, numbers="")
+
+    def __enter__(self) -> Display:
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._bar:
+            self._bar.stop()
+        if self._board:
+            self._board.close()
+        if self._lines:
+            self._lines.close()
+
+    def report(self, stage: str, step: int, values: dict[str, float]) -> None:
+        """Show scalars (losses, rates, validation figures) of step `step` of all steps."""
+        if not self._active:
+            return
+        seconds = time.monotonic() - self._started
+        each = seconds / max(1, step - self._first)
+        left = each * (self._total - step)
+        self._lines.write(json.dumps({"step": step, "stage": stage, **values}) + "\n")
+        self._lines.flush()
+        if self._board:
+            for name, value in values.items():
+                self._board.add_scalar(name, value, step)
+        numbers = "  ".join(f"{name.removeprefix('loss/')} {v:.4g}" for name, v in values.items())
+        if self._bar:
+            self._bar.update(self._task, completed=step, description=stage, numbers=numbers)
+        else:
+            log.info(
+                "%s %d/%d  %s  %.2f s/step, %s left", stage, step, self._total, numbers, each,
+                f"{left / 60:.0f} min" if left > 90 else f"{left:.0f} s",
+            )
+
+
+def _tensorboard(folder: Path, step: int) -> Any:
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        log.info("no TensorBoard scalars; install nrdf[train] to get them")
+        return None
+    return SummaryWriter(str(folder), purge_step=step + 1)

@@ -1,0 +1,62 @@
+"""How good a field is on shapes that it was not trained on."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import torch
+
+from nrdf.field.base import Field
+from nrdf.training.data import Bank
+
+STEPS = 8
+BATCH = 8
+
+
+@torch.no_grad()
+def validate(field: Field, bank: Bank) -> dict[str, float]:
+    """Scores on undeformed shapes, the same draw every time.
+
+    `val/error`: mean distance between predicted and known corresponding points (canonical
+    lengths); `val/copy`: that of leaving every point where it is; `val/iou`: intersection over
+    union of predicted and true occupancy over the queries. With several pools, the error of each
+    as well. Scores that the shapes give no ground for are left out.
+    """
+    training = {module: module.training for module in field.modules()}
+    field.eval()
+    sums = {pattern: _sums(field, pool) for pattern, pool in bank.plain().items()}
+    for module, mode in training.items():
+        module.training = mode
+    every: dict[str, float] = defaultdict(float)
+    for found in sums.values():
+        for name, value in found.items():
+            every[name] += value
+    scores = {}
+    if every["weight"] > 0:
+        scores["val/error"] = every["error"] / every["weight"]
+        scores["val/copy"] = every["copy"] / every["weight"]
+    for pattern, found in sums.items():
+        if len(sums) > 1 and found["weight"] > 0:
+            scores[f"val/error {pattern}"] = found["error"] / found["weight"]
+    if every["either"] > 0:
+        scores["val/iou"] = every["inside"] / every["either"]
+    return scores
+
+
+def _sums(field: Field, pool: Bank) -> dict[str, float]:
+    """Numerators and denominators of the scores over one pool."""
+    sums: dict[str, float] = defaultdict(float)
+    size = min(BATCH, max(len(members) for _, _, members in pool.pools))
+    for step in range(STEPS):
+        batch = pool.batch(size, seed=0, step=step)
+        z = field.embed(batch.points, batch.normals)
+        found = field.transfer(
+            z[batch.reference], batch.source, batch.source_normals, z[batch.partner]
+        ).points
+        sums["error"] += float(((found - batch.target).norm(dim=-1) * batch.weight).sum())
+        sums["copy"] += float(((batch.source - batch.target).norm(dim=-1) * batch.weight).sum())
+        sums["weight"] += float(batch.weight.sum())
+        guess, truth = field.occupancy(z, batch.queries) > 0, batch.occupancy > 0.5
+        sums["inside"] += float((guess & truth).sum())
+        sums["either"] += float((guess | truth).sum())
+    return sums
