@@ -1,0 +1,391 @@
+"""A point cloud, and the files it is read from and written to."""
+
+from __future__ import annotations
+
+import logging
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from nrdf import ply
+from nrdf.errors import CloudError
+from nrdf.geometry import outward_by_visibility
+
+logger = logging.getLogger(__name__)
+
+KNOWN_FORMATS = "PLY, XYZ/TXT/CSV/ASC/PTS, PCD, NPY, NPZ, OFF, OBJ, STL"
+MOST_DROPPED = 0.01  # largest share of points that may have NaN or infinite coordinates
+FLATTEST = 1e-3  # least ratio of the smallest to the largest extent (standard deviations)
+_UNITS = ("m", "cm", "mm", "in")
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points on an object's surface.
+
+    points: (n, 3) float64, finite; normals: (n, 3) float64, unit length, outward, or None;
+    unit: "m", "mm", … or None where the file does not say; frame: name of the coordinate frame, or
+    None.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray | None = None
+    unit: str | None = None
+    frame: str | None = None
+
+    def __post_init__(self) -> None:
+        points = np.ascontiguousarray(self.points, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise CloudError(f"points must have the shape (n, 3), not {points.shape}")
+        object.__setattr__(self, "points", points)
+        if self.normals is not None:
+            normals = np.ascontiguousarray(self.normals, dtype=np.float64)
+            if normals.shape != points.shape:
+                raise CloudError(f"{normals.shape} normals do not fit {points.shape} points")
+            object.__setattr__(self, "normals", normals)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def select(self, index: np.ndarray) -> PointCloud:
+        """The points at `index`, integers (k,) or a mask (n,), with their normals."""
+        normals = None if self.normals is None else self.normals[index]
+        return replace(self, points=self.points[index], normals=normals)
+
+
+def read_cloud(path: str | Path, mesh_samples: int = 30_000) -> PointCloud:
+    """Point cloud of the file `path`; the format is told from its content and its name's ending.
+
+    A mesh (faces in a PLY, OFF, OBJ or STL file) is sampled: `mesh_samples` points spread evenly
+    over what is visible from outside, always the same ones, with outward normals; its vertices
+    would be a poor cloud. With `mesh_samples` 0 the vertices are taken all the same. Normals in
+    the file are used as they are, brought to unit length; they are left out if some are missing.
+    A PLY comment ``unit mm`` or ``frame name`` sets the unit or the frame.
+
+    Raises CloudError if the file is missing, unreadable, truncated, in no known format, or empty,
+    or if 1 % or more of its points have NaN or infinite coordinates; fewer are dropped, with a
+    warning that counts them.
+    """
+    path = Path(path)
+    try:
+        with open(path, "rb") as file:
+            start = file.read(512)
+        if not start:
+            raise CloudError(f"{path}: the file is empty")
+        cloud = _reader(path, start)(path, mesh_samples)
+    except OSError as error:
+        raise CloudError(f"cannot read {path}: {error.strerror or error}") from error
+    return _clean(path, cloud)
+
+
+def _reader(path: Path, start: bytes) -> Callable[[Path, int], PointCloud]:
+    ending = path.suffix.lower()
+    if start.startswith((b"ply\n", b"ply\r")):
+        return _read_ply
+    if start.startswith(b"\x93NUMPY"):
+        return _read_npy
+    if start.startswith(b"PK\x03\x04") and ending == ".npz":
+        return _read_npz
+    if start.lstrip()[:6] == b"# .PCD" or (ending == ".pcd" and start.startswith(b"VERSION")):
+        return _read_pcd
+    if ending == ".off" or start.split(b"\n", 1)[0].strip() in (b"OFF", b"COFF", b"NOFF"):
+        return _read_off
+    if ending == ".obj":
+        return _read_obj
+    if ending == ".stl":
+        return _read_mesh
+    text = b"\0" not in start
+    if ending in (".xyz", ".xyzn", ".txt", ".csv", ".asc", ".pts") and text:
+        return _read_text
+    raise CloudError(f"{path}: not a point cloud that can be read; known formats: {KNOWN_FORMATS}")
+
+
+def _clean(path: Path, cloud: PointCloud) -> PointCloud:
+    """Drop the few points that are not finite, bring normals to unit length, or refuse."""
+    if len(cloud) == 0:
+        raise CloudError(f"{path}: the cloud holds no points")
+    finite = np.isfinite(cloud.points).all(axis=1)
+    missing = int((~finite).sum())
+    if missing >= MOST_DROPPED * len(cloud) and missing:
+        raise CloudError(
+            f"{path}: {missing} of {len(cloud)} points have NaN or infinite coordinates; under "
+            f"{MOST_DROPPED:.0%} would be dropped: remove them, or export the cloud again"
+        )
+    if missing:
+        logger.warning("%s: dropped %d points with NaN or infinite coordinates", path, missing)
+        cloud = cloud.select(finite)
+    if cloud.normals is None:
+        return cloud
+    length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
+    if not (np.isfinite(length) & (length > 1e-6)).all():
+        logger.warning("%s: some normals are zero or not finite; all are left out", path)
+        return replace(cloud, normals=None)
+    return replace(cloud, normals=cloud.normals / length)
+
+
+def check_cloud(cloud: PointCloud, minimum_points: int) -> None:
+    """Raise CloudError unless `cloud` has `minimum_points` points that span three dimensions."""
+    if len(cloud) == 0:
+        raise CloudError("the cloud holds no points")
+    if len(cloud) < minimum_points:
+        raise CloudError(
+            f"the cloud has {len(cloud)} points; at least {minimum_points} are needed: "
+            "scan or sample it more densely"
+        )
+    if not np.isfinite(cloud.points).all():
+        raise CloudError("the cloud has NaN or infinite coordinates; remove those points")
+    offset = cloud.points - cloud.points.mean(axis=0)
+    largest = float(np.abs(offset).max())
+    if largest == 0.0 or largest <= 1e-12 * float(np.abs(cloud.points).max()):
+        raise CloudError("all points of the cloud coincide; a cloud of a whole object is needed")
+    offset = offset / largest
+    extent = np.sqrt(np.maximum(np.linalg.eigvalsh(offset.T @ offset / len(offset)), 0.0))[::-1]
+    kind = "collinear" if extent[1] < FLATTEST * extent[0] else "flat"
+    if extent[2] < FLATTEST * extent[0]:
+        raise CloudError(
+            f"the cloud is {kind}: its smallest extent is {extent[2] / extent[0]:.1e} of its "
+            f"largest, at least {FLATTEST:g} is needed; a cloud of a whole object is needed"
+        )
+
+
+def write_cloud(
+    path: str | Path,
+    cloud: PointCloud,
+    colours: np.ndarray | None = None,
+    scalars: Mapping[str, np.ndarray] | None = None,
+) -> None:
+    """Write `cloud` as binary PLY, all of it or nothing.
+
+    colours: (n, 3) uint8, red, green, blue; scalars: further properties by name, each (n,), for
+    instance ``{"confidence": …}``. Raises OutputError if the file cannot be written, CloudError if
+    an array does not fit or a name is no PLY property name.
+    """
+    columns = {name: cloud.points[:, i] for i, name in enumerate("xyz")}
+    if cloud.normals is not None:
+        columns |= {f"n{a}": cloud.normals[:, i].astype("f4") for i, a in enumerate("xyz")}
+    if colours is not None:
+        colours = np.asarray(colours)
+        if colours.shape != cloud.points.shape or colours.dtype != np.uint8:
+            raise CloudError(
+                f"colours must be ({len(cloud)}, 3) of uint8, not {colours.shape} of "
+                f"{colours.dtype}"
+            )
+        columns |= {name: colours[:, i] for i, name in enumerate(("red", "green", "blue"))}
+    for name, values in (scalars or {}).items():
+        values = np.asarray(values)
+        if values.shape != (len(cloud),):
+            raise CloudError(f"'{name}' must have the shape ({len(cloud)},), not {values.shape}")
+        if not (name.isidentifier() and name.isascii()) or name in columns:
+            raise CloudError(f"'{name}' is no name for a further PLY property")
+        columns[name] = values.astype("i4" if values.dtype.kind in "bi" else "f4")
+    comments = [f"unit {cloud.unit}"] if cloud.unit else []
+    comments += [f"frame {cloud.frame}"] if cloud.frame else []
+    ply.write_rows(Path(path), columns, comments)
+
+
+def _read_ply(path: Path, mesh_samples: int) -> PointCloud:
+    header = ply.read_header(path)
+    said = dict(c.split(" ", 1) for c in header.comments if c.startswith(("unit ", "frame ")))
+    unit = said.get("unit", "").strip()
+    if header.count("face") and mesh_samples:
+        cloud = _read_mesh(path, mesh_samples)
+    else:
+        columns = ply.read_scalars(path, header)
+        points = _columns(columns, "xyz")
+        if points is None:
+            raise CloudError(
+                f"{path}: its vertices have the properties {', '.join(columns) or '(none)'}; "
+                "x, y and z are needed"
+            )
+        cloud = PointCloud(points, _columns(columns, ("nx", "ny", "nz")))
+    return replace(cloud, unit=unit if unit in _UNITS else None, frame=said.get("frame"))
+
+
+def _columns(columns: Mapping[str, np.ndarray], names: str | tuple[str, ...]) -> np.ndarray | None:
+    if any(name not in columns for name in names):
+        return None
+    return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+
+
+def _read_npy(path: Path, _: int) -> PointCloud:
+    try:
+        return _from_table(path, np.load(path, allow_pickle=False, mmap_mode="r"))
+    except (ValueError, EOFError) as error:
+        raise CloudError(f"{path}: truncated or not a plain NumPy array ({error})") from error
+
+
+def _read_npz(path: Path, _: int) -> PointCloud:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if max((i.file_size for i in archive.infolist()), default=0) > 48 * ply.MOST_POINTS:
+                raise CloudError(f"{path}: an array of it has more than {ply.MOST_POINTS} points")
+        with np.load(path, allow_pickle=False) as arrays:
+            for prefix in ("", "pointcloud/"):
+                if f"{prefix}points" in arrays:
+                    points = _from_table(path, arrays[f"{prefix}points"])
+                    if f"{prefix}normals" in arrays:
+                        return PointCloud(points.points, arrays[f"{prefix}normals"])
+                    return points
+            raise CloudError(
+                f"{path}: no array 'points' (n, 3); this file has: {', '.join(arrays.files)}"
+            )
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise CloudError(f"{path}: truncated or not plain NumPy arrays ({error})") from error
+
+
+def _from_table(path: Path, table: np.ndarray) -> PointCloud:
+    """Points, and normals if columns 4 to 6 are unit vectors, of a table (n, 3 or more)."""
+    if table.ndim != 2 or table.shape[1] < 3 or table.dtype.kind not in "fiu":
+        raise CloudError(
+            f"{path}: a numeric table (n, 3), or (n, 6) with normals, is needed; this one is "
+            f"{table.shape} of {table.dtype}"
+        )
+    table = np.asarray(table[:, :6], dtype=np.float64)
+    normals = table[:, 3:]
+    # Six columns may as well be colours: only unit vectors are normals.
+    is_unit = normals.shape[1] == 3 and len(table) > 0
+    is_unit = is_unit and bool((np.abs((normals**2).sum(axis=1) - 1.0) < 0.02).mean() > 0.95)
+    return PointCloud(table[:, :3], normals if is_unit else None)
+
+
+def _read_text(path: Path, _: int) -> PointCloud:
+    """Rows of numbers divided by spaces, tabs, commas or semicolons; headings are skipped."""
+    skip, delimiter, wide = 0, None, 0
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for line in file:
+            body = line.split("#")[0].split("//")[0].strip()
+            delimiter = "," if "," in body else ";" if ";" in body else None
+            words = [word for word in body.split(delimiter) if word.strip()]
+            try:
+                wide = len([float(word) for word in words])
+            except ValueError:
+                wide = 0
+            if wide >= 3:
+                break
+            skip += 1
+            if skip > 100 or (skip > 1 and body and not wide):
+                break
+        if wide < 3:
+            raise CloudError(
+                f"{path}: not a point cloud: rows of three or more numbers are needed; "
+                f"known formats: {KNOWN_FORMATS}"
+            )
+    columns = tuple(range(min(wide, 6)))
+    try:
+        table = np.loadtxt(
+            path, skiprows=skip, delimiter=delimiter, usecols=columns, ndmin=2,
+            comments=["#", "//"], encoding="utf-8",
+        )  # fmt: skip
+    except ValueError as error:
+        raise CloudError(f"{path}: not a table of numbers: {error}") from error
+    return _from_table(path, table)
+
+
+def _read_pcd(path: Path, _: int) -> PointCloud:
+    """Point Cloud Library's format, DATA ascii or binary."""
+    said: dict[str, list[str]] = {}
+    with open(path, "rb") as file:
+        while "DATA" not in said:
+            line = file.readline(4096)
+            if not line or file.tell() > 65536:
+                raise CloudError(f"{path}: damaged PCD header: no DATA line")
+            words = line.decode("ascii", errors="replace").split("#")[0].split()
+            if words:
+                said[words[0]] = words[1:]
+        try:
+            fields = said["FIELDS"]
+            count = int(said["POINTS"][0])
+            repeats = [int(c) for c in said.get("COUNT", ["1"] * len(fields))]
+            kinds = [t.lower() + s for t, s in zip(said["TYPE"], said["SIZE"], strict=True)]
+            row = np.dtype(
+                [
+                    (f"{i}", "<" + k, (c,))
+                    for i, (k, c) in enumerate(zip(kinds, repeats, strict=True))
+                ]
+            )
+            data = said["DATA"][0]
+            if not 0 <= count <= ply.MOST_POINTS or len(fields) != len(kinds):
+                raise ValueError(f"{count} points of {len(fields)} fields")
+            if data == "ascii":
+                table = np.loadtxt(file, max_rows=count, ndmin=2, comments=None)
+                first = np.concatenate([[0], np.cumsum(repeats)[:-1]])
+                columns = {name: table[:, i] for name, i in zip(fields, first, strict=True)}
+            elif data == "binary":
+                raw = np.frombuffer(file.read(), np.uint8)[: count * row.itemsize]
+                rows = raw[: len(raw) // row.itemsize * row.itemsize].view(row)
+                table = rows
+                columns = {name: rows[f"{i}"][:, 0] for i, name in enumerate(fields)}
+            else:
+                raise ValueError(f"DATA {data} is not read; save it as DATA binary")
+            if len(table) != count:
+                raise ValueError(f"truncated: {len(table)} of {count} points")
+        except (KeyError, ValueError, IndexError, TypeError) as error:
+            raise CloudError(f"{path}: cannot read this PCD file: {error}") from error
+    points = _columns(columns, "xyz")
+    if points is None:
+        raise CloudError(f"{path}: fields x, y and z are needed; it has {', '.join(fields)}")
+    return PointCloud(points, _columns(columns, ("normal_x", "normal_y", "normal_z")))
+
+
+def _read_off(path: Path, mesh_samples: int) -> PointCloud:
+    with open(path, "rb") as file:
+        words: list[bytes] = []
+        while len(words) < 4:
+            line = file.readline(4096)
+            if not line:
+                raise CloudError(f"{path}: damaged OFF header: no counts")
+            words += line.split(b"#")[0].split()
+            if words and not words[0].endswith(b"OFF"):
+                raise CloudError(f"{path}: not an OFF file: it does not begin with OFF")
+        try:
+            points, faces = int(words[1]), int(words[2])
+            if faces and mesh_samples:
+                return _read_mesh(path, mesh_samples)
+            if not 0 <= points <= path.stat().st_size // 6 + 1:
+                raise ValueError(f"{points} points are more than the file holds")
+            table = np.loadtxt(file, max_rows=points, usecols=(0, 1, 2), ndmin=2)
+            if len(table) != points:
+                raise ValueError(f"truncated: {len(table)} of {points} points")
+        except ValueError as error:
+            raise CloudError(f"{path}: damaged OFF file: {error}") from error
+    return PointCloud(table)
+
+
+def _read_obj(path: Path, mesh_samples: int) -> PointCloud:
+    vertices: list[list[float]] = []
+    with open(path, encoding="utf-8", errors="replace") as file:
+        for line in file:
+            if mesh_samples and line.startswith("f "):
+                return _read_mesh(path, mesh_samples)
+            if line.startswith("v "):
+                try:
+                    vertices.append([float(word) for word in line.split()[1:4]])
+                except ValueError as error:
+                    raise CloudError(f"{path}: damaged OBJ line '{line.strip()[:60]}'") from error
+    if any(len(vertex) != 3 for vertex in vertices):
+        raise CloudError(f"{path}: damaged OBJ file: a vertex needs three coordinates")
+    return PointCloud(np.array(vertices, dtype=np.float64).reshape(-1, 3))
+
+
+def _read_mesh(path: Path, samples: int) -> PointCloud:
+    """Sample the visible surface of the mesh `path` evenly, the same points every time."""
+    import trimesh
+
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False)
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise CloudError(f"{path}: truncated or damaged mesh ({error})") from error
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise CloudError(f"{path}: the mesh holds no faces")
+    if not np.isfinite(mesh.vertices).all() or not mesh.area > 0.0:
+        raise CloudError(f"{path}: the mesh has no surface, or vertices that are not finite")
+    logger.info("%s is a mesh: sampled %d points of its surface", path, samples)
+    rng = np.random.default_rng(0)
+    points, face = trimesh.sample.sample_surface(mesh, 2 * max(samples, 1), seed=rng)
+    points = np.asarray(points, dtype=np.float64)
+    normals, seen_by = outward_by_visibility(points, mesh.face_normals[face])
+    visible = np.flatnonzero(seen_by >= 2)[:samples]
+    return PointCloud(points[visible], normals[visible])
