@@ -46,7 +46,7 @@ class Affine:
 
     @cached_property
     def _inverse(self) -> Array:
-        return np.linalg.inv(self.matrix)
+        return np.asarray(np.linalg.inv(self.matrix), np.float64)
 
     @cached_property
     def orientation(self) -> float:
@@ -166,6 +166,10 @@ class Part:
     windows: tuple[Window, ...] = ()
     maps: tuple[Map, ...] = ()
     station: Callable[[Array, Array], Array] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.stop > self.start:
+            raise ValueError(f"part {self.slot}: stop {self.stop} must exceed start {self.start}")
 
     def mapped(self, *maps: Map, slot: str | None = None) -> Part:
         """This part with further maps, and another slot where given."""

@@ -1,4 +1,4 @@
-"""Members: a union of parts made canonical; families: members from a seed, and shared coordinates."""
+"""Members (a union of parts made canonical) and families (members from a seed)."""
 
 from __future__ import annotations
 

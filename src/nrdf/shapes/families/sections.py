@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 Curve = float | Callable[[Array], Array]
 """A constant, or a function of s (n,) in [0, 1] that returns (n,)."""
 
+Knots = Sequence[float] | NDArray[np.floating]
+
 TINY = 1e-12
 
 
@@ -27,24 +29,26 @@ def at(curve: Curve, s: Array) -> Array | float:
     return curve(s) if callable(curve) else float(curve)
 
 
-def linear(knots: Sequence[float], values: Sequence[float]) -> Callable[[Array], Array]:
+def linear(knots: Knots, values: Knots) -> Callable[[Array], Array]:
     """Piecewise linear curve through (knots, values), constant beyond both ends."""
     x, y = np.asarray(knots, float), np.asarray(values, float)
     return lambda s: np.interp(s, x, y)
 
 
-def smooth(knots: Sequence[float], values: Sequence[float]) -> Callable[[Array], Array]:
+def smooth(knots: Knots, values: Knots) -> Callable[[Array], Array]:
     """Monotone cubic curve (PCHIP: no overshoot) through (knots, values), constant beyond."""
     x, y = np.asarray(knots, float), np.asarray(values, float)
     cubic = PchipInterpolator(x, y)
     return lambda s: cubic(np.clip(s, x[0], x[-1]))
 
 
-def rounded(curve: Curve, start: float, stop: float, exponent: float = 2.0) -> Curve:
-    """The curve, falling to 0 at s = 0 over `start` and at s = 1 over `stop`, like an ellipse.
+def rounded(
+    curve: Curve, start: float, stop: float, exponent: float = 2.0, depth: float = 1.0
+) -> Curve:
+    """The curve, falling at s = 0 over `start` and at s = 1 over `stop`, like an ellipse.
 
     `start` and `stop` are fractions of the loft's length (0 keeps that end square); a larger
-    exponent gives a blunter end.
+    exponent gives a blunter end; at the very end the curve is 1 - depth of itself (a fillet).
     """
 
     def value(s: Array) -> Array:
@@ -53,7 +57,7 @@ def rounded(curve: Curve, start: float, stop: float, exponent: float = 2.0) -> C
             factor = factor * _quarter(np.clip((start - s) / start, 0, 1), exponent)
         if stop > 0:
             factor = factor * _quarter(np.clip((s - 1 + stop) / stop, 0, 1), exponent)
-        return at(curve, s) * factor
+        return at(curve, s) * (1 - depth * (1 - factor))
 
     return value
 
