@@ -310,7 +310,7 @@ def _read_pcd(path: Path, _: int) -> PointCloud:
             if not 0 <= count <= ply.MOST_POINTS or len(fields) != len(kinds):
                 raise ValueError(f"{count} points of {len(fields)} fields")
             if data == "ascii":
-                table = np.loadtxt(file, max_rows=count, ndmin=2, comments=None)
+                table: np.ndarray = np.loadtxt(file, max_rows=count, ndmin=2, comments=None)
                 first = np.concatenate([[0], np.cumsum(repeats)[:-1]])
                 columns = {name: table[:, i] for name, i in zip(fields, first, strict=True)}
             elif data == "binary":
