@@ -19,7 +19,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nrdf.shapes.families.sections import Array, Curve, Section, at
+from nrdf.shapes.families.sections import TINY, Array, Curve, Section, at
+
+Faces = NDArray[np.integer]
 
 SIDE, CAP_START, CAP_STOP, WALL = 0, 1, 2, 3
 """Faces of a part; the wall of window w is face WALL + w.key."""
@@ -208,72 +210,75 @@ class Part:
             inside &= ~self._cut(p, s)
         return inside
 
-    def _cut(self, p: Array, s: Array, skip: Window | None = None) -> NDArray[np.bool_]:
-        xi = p / np.maximum(self.section.half_width(s), 1e-12)
+    def _cut(
+        self, p: Array, s: Array, skip: NDArray[np.integer] | None = None
+    ) -> NDArray[np.bool_]:
+        """Whether a window lies at (p, s), other than the one whose index is in `skip` (n,)."""
+        xi = p / np.maximum(self.section.half_width(s), TINY)
         cut = np.zeros(len(s), bool)
-        for window in self.windows:
-            if window is not skip:
-                cut |= window.contains(xi, s)
+        for index, window in enumerate(self.windows):
+            here = window.contains(xi, s)
+            cut |= here if skip is None else here & (skip != index)
         return cut
-
-    def _local(self, face: int, u: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Section coordinates and s, (n,) each, of points of one face."""
-        if face >= WALL:
-            xi, s = self._window(face).outline(u)
-            low, high = self.section.chord(np.clip(xi, -1, 1), np.clip(s, 0, 1))
-            return xi * self.section.half_width(np.clip(s, 0, 1)), low + v * (high - low), s
-        ones = np.ones_like(u)
-        if face == SIDE:
-            rho, s = ones, v if self.station is None else self.station(u, v)
-        else:
-            rho, s = v, ones * (face == CAP_STOP)
-        return *self.section.disc(u, rho, s), s
-
-    def _window(self, face: int) -> Window:
-        return next(w for w in self.windows if w.key == face - WALL)
-
-    def has_face(self, face: int) -> bool:
-        return face < WALL or any(w.key == face - WALL for w in self.windows)
 
     @property
     def faces(self) -> list[int]:
+        """The faces that this part has."""
         return [SIDE, CAP_START, CAP_STOP, *(WALL + w.key for w in self.windows)]
 
-    def points(self, face: int, u: Array, v: Array) -> Array:
-        """Surface points (n, 3)."""
-        return self._map(*self._local(face, u, v))
+    def _local(
+        self, face: Faces, u: Array, v: Array, wall: NDArray[np.intp]
+    ) -> tuple[Array, Array, Array]:
+        """Section coordinates and s, (n,) each."""
+        rho, s = np.where(face == SIDE, 1.0, v), np.where(face == SIDE, v, face == CAP_STOP)
+        if not len(wall):
+            return *self.section.disc(u, rho, s), s
+        p, q = np.empty_like(u), np.empty_like(u)
+        for index in np.unique(face[wall]):
+            of = wall[face[wall] == index]
+            window = next(w for w in self.windows if w.key == index - WALL)
+            xi, s[of] = window.outline(u[of])
+            inner = np.clip(s[of], 0, 1)
+            low, high = self.section.chord(np.clip(xi, -1, 1), inner)
+            p[of], q[of] = xi * self.section.half_width(inner), low + v[of] * (high - low)
+        rest = np.flatnonzero(face < WALL)
+        p[rest], q[rest] = self.section.disc(u[rest], rho[rest], s[rest])
+        return p, q, s
 
-    def surface(self, face: int, u: Array, v: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Points (n, 3), unit outward normals (n, 3), and whether material ends there (n,)."""
-        p, q, s = self._local(face, u, v)
-        if face in (CAP_START, CAP_STOP):
-            h = STEP * (self.stop - self.start)
-            probes = [(p, q, s), (p - h, q, s), (p + h, q, s), (p, q - h, s), (p, q + h, s)]
-        else:
-            low, high = np.maximum(v - STEP, 0), np.minimum(v + STEP, 1)
-            probes = [
-                (p, q, s),
-                self._local(face, u - STEP, v),
-                self._local(face, u + STEP, v),
-                self._local(face, u, low),
-                self._local(face, u, high),
-            ]
-        stacked = [np.concatenate(x) for x in zip(*probes, strict=True)]
-        centre, back, forth, down, up = self._map(*stacked).reshape(5, len(u), 3)
+    def points(self, face: Faces, u: Array, v: Array) -> Array:
+        """Surface points (n, 3) of faces that this part has."""
+        return self._map(*self._local(face, u, v, np.flatnonzero(face >= WALL)))
+
+    def surface(self, face: Faces, u: Array, v: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Points (n, 3), unit outward normals (n, 3), and whether material ends there (n,).
+
+        `face` (n,) may only name faces that this part has.
+        """
+        low, high = np.maximum(v - STEP, 0), np.minimum(v + STEP, 1)
+        faces, us = np.tile(face, 5), np.concatenate([u, u - STEP, u + STEP, u, u])
+        walls = np.flatnonzero(faces >= WALL)
+        local = self._local(faces, us, np.concatenate([v, v, v, low, high]), walls)
+        p, q, s = (x.reshape(5, -1) for x in local)
+        cap = np.flatnonzero((face == CAP_START) | (face == CAP_STOP))
+        h = STEP * (self.stop - self.start)
+        p[:, cap] = p[0, cap] + h * np.array([[0], [-1], [1], [0], [0]])
+        q[:, cap] = q[0, cap] + h * np.array([[0], [0], [0], [-1], [1]])
+        centre, back, forth, down, up = self._map(*local).reshape(5, -1, 3)
         normals = np.cross(forth - back, up - down)
-        sign = -1.0 if face == CAP_START else 1.0
+        length = np.linalg.norm(normals, axis=1)
+        exists = length > 0
+        sign = np.where(face == CAP_START, -1.0, 1.0) / np.maximum(length, 1e-300)
         for step in self.maps:
             sign *= step.orientation
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals = sign * normals / np.maximum(length, 1e-300)
-        exists = length[:, 0] > 0
-        if face >= WALL:
-            xi = p / np.maximum(self.section.half_width(np.clip(s, 0, 1)), 1e-12)
-            exists &= (np.abs(xi) < 1) & (s > 0) & (s < 1)
-            exists &= ~self._cut(p, np.clip(s, 0, 1), skip=self._window(face))
-        elif self.windows:
-            exists &= ~self._cut(p, s)
-        return centre, normals, exists
+        if self.windows:
+            keys = np.array([w.key for w in self.windows])
+            own = np.where(face[:, None] == WALL + keys, np.arange(len(keys)), -1).max(1)
+            inner = np.clip(s[0], 0, 1)
+            exists &= ~self._cut(p[0], inner, skip=own)
+            exists &= (own < 0) | (
+                (np.abs(p[0]) < self.section.half_width(inner)) & (s[0] > 0) & (s[0] < 1)
+            )
+        return centre, normals * sign[:, None], exists
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from nrdf.shapes.families.base import (
     CAP_START,
     CAP_STOP,
+    SIDE,
     SKIN,
     WALL,
     Affine,
@@ -23,9 +24,7 @@ from nrdf.shapes.families.base import (
     SurfaceSample,
 )
 
-_U_NODES = np.linspace(0, 1, 25)
-_V_NODES = (1 - np.cos(np.pi * np.linspace(0, 1, 15))) / 2
-_WALL_NODES = np.array([0.0, 1.0])
+Mask = NDArray[np.bool_]
 
 
 class Member:
@@ -42,52 +41,49 @@ class Member:
         if unknown or len(set(names)) < len(names):
             raise ValueError(f"parts need distinct slots out of {self.slots}; got {names}")
         self.parts = tuple(parts)
-        low, high = self._bounds()
+        self._slot_index = np.array([self.slots.index(name) for name in names], np.int32)
+        self._grids = [_Grid(part) for part in self.parts]
+        lows = np.array([grid.points.min(0) for grid in self._grids])
+        highs = np.array([grid.points.max(0) for grid in self._grids])
+        low, high = self._bounds(lows, highs)
         self.centre = (low + high) / 2
         self.scale = float((high - low).max())
         to_canonical = Affine(np.eye(3) / self.scale, -self.centre / self.scale)
         self.parts = tuple(part.mapped(to_canonical) for part in parts)
-        self._slot_index = np.array([self.slots.index(name) for name in names], np.int32)
-        margin = 0.05 * (self._grid_high - self._grid_low) / self.scale + 1e-3
-        self._low = (self._grid_low - self.centre) / self.scale - margin
-        self._high = (self._grid_high - self.centre) / self.scale + margin
+        margin = 0.05 * (highs - lows) / self.scale + 1e-3
+        self._low = (lows - self.centre) / self.scale - margin
+        self._high = (highs - self.centre) / self.scale + margin
 
-    def _bounds(self) -> tuple[Array, Array]:
-        """Tight bounding box, in the parts' unit: a grid, refined around its extreme points."""
-        grids = [
-            [(f, u, v, part.points(f, u, v)) for f, u, v in _grids(part) if f < WALL]
-            for part in self.parts
-        ]
-        self._grid_low = np.array([np.min([g[3].min(0) for g in gs], 0) for gs in grids])
-        self._grid_high = np.array([np.max([g[3].max(0) for g in gs], 0) for gs in grids])
-        low, high = self._grid_low.min(0), self._grid_high.max(0)
-        offsets = np.linspace(-1, 1, 41)
-        for axis in range(3):
-            for sign, bound, edge in ((-1, low, self._grid_low), (1, high, self._grid_high)):
-                index = int(np.argmax(sign * edge[:, axis]))
-                face, u, v, points = max(grids[index], key=lambda g: (sign * g[3][:, axis]).max())
-                best = int(np.argmax(sign * points[:, axis]))
-                near_v = np.clip(v[best] + 0.11 * offsets * np.abs(offsets), 0, 1)
-                near_u = u[best] + offsets / 24
-                a, b = (x.ravel() for x in np.meshgrid(near_u, near_v))
-                fine = self.parts[index].points(face, a, b)[:, axis]
+    def _bounds(self, lows: Array, highs: Array) -> tuple[Array, Array]:
+        """Tight bounding box, in the parts' unit, from the grids', refined where they touch it."""
+        low, high = lows.min(0), highs.max(0)
+        offsets = np.linspace(-1, 1, 33)
+        for sign, bound, edges in ((-1, low, lows), (1, high, highs)):
+            for axis in range(3):
+                index = int(np.argmax(sign * edges[:, axis]))
+                grid = self._grids[index]
+                best = int(np.argmax(sign * grid.points[:, axis]))
+                near_v = np.clip(grid.v[best] + 0.11 * offsets * np.abs(offsets), 0, 1)
+                u, v = np.meshgrid(grid.u[best] + offsets / 24, near_v)
+                face = np.full(u.size, grid.face[best])
+                fine = self.parts[index].points(face, u.ravel(), v.ravel())[:, axis]
                 bound[axis] = sign * max(sign * bound[axis], (sign * fine).max())
         return low, high
 
     def occupancy(self, points: Array) -> NDArray[np.bool_]:
         """Whether each canonical point (n, 3) is inside the shape: (n,), exact."""
-        return self._inside(np.asarray(points, float), skip=-1)
+        return self._inside(np.asarray(points, float))
 
-    def _inside(self, points: Array, skip: int) -> NDArray[np.bool_]:
-        """Inside any part but the one with index `skip`."""
+    def _inside(self, points: Array, owner: NDArray[np.integer] | None = None) -> Mask:
+        """Inside any part but the one whose index is in `owner` (n,)."""
         inside = np.zeros(len(points), bool)
+        x, y, z = np.ascontiguousarray(points.T)
         for index, part in enumerate(self.parts):
-            if index == skip:
-                continue
-            near = ~inside
-            for axis in range(3):
-                near &= points[:, axis] >= self._low[index, axis]
-                near &= points[:, axis] <= self._high[index, axis]
+            low, high = self._low[index], self._high[index]
+            near = (x >= low[0]) & (x <= high[0]) & (z >= low[2]) & (z <= high[2])
+            near &= (y >= low[1]) & (y <= high[1]) & ~inside
+            if owner is not None:
+                near &= owner != index
             where = np.flatnonzero(near)
             if len(where):
                 inside[where] = part.inside(points[where])
@@ -101,43 +97,37 @@ class Member:
         """
         count = len(coordinates)
         points, normals = np.zeros((count, 3)), np.zeros((count, 3))
+        owner = np.full(count, -1)
         exists = np.zeros(count, bool)
-        key = coordinates.slot.astype(np.int64) << 32 | coordinates.face
-        order = np.argsort(key, kind="stable")
-        _, starts = np.unique(key[order], return_index=True)
-        for where in np.split(order, starts[1:]):
-            if not len(where):
-                continue
-            found = np.flatnonzero(self._slot_index == coordinates.slot[where[0]])
-            face = int(coordinates.face[where[0]])
-            if not len(found) or not self.parts[found[0]].has_face(face):
-                continue
-            surface = self.parts[found[0]].surface(face, coordinates.u[where], coordinates.v[where])
-            points[where], normals[where], exists[where] = surface
-        for index, slot in enumerate(self._slot_index):
-            mine = np.flatnonzero(exists & (coordinates.slot == slot))
+        for index, (slot, part) in enumerate(zip(self._slot_index, self.parts, strict=True)):
+            mine = np.flatnonzero(coordinates.slot == slot)
+            face = coordinates.face[mine]
+            if len(mine) and face.max() >= WALL:
+                mine = mine[np.isin(face, part.faces)]
+                face = coordinates.face[mine]
             if len(mine):
-                ahead = points[mine] + SKIN * normals[mine]
-                exists[mine] = ~self._inside(ahead, skip=index)
+                owner[mine] = index
+                points[mine], normals[mine], exists[mine] = part.surface(
+                    face, coordinates.u[mine], coordinates.v[mine]
+                )
+        found = np.flatnonzero(exists)
+        ahead = points[found] + SKIN * normals[found]
+        exists[found] = ~self._inside(ahead, owner[found])
         return Located(points, normals, exists)
 
     @cached_property
     def _cells(self) -> tuple[Array, Array]:
         """Surface cells (m, 6): slot, face, u0, u1, v0, v1; and their cumulative area (m,)."""
         rows, areas = [], []
-        for index, part in enumerate(self.parts):
-            for face, u, v in _grids(part):
-                nodes = _WALL_NODES if face >= WALL else _V_NODES
-                shape = (len(nodes), len(_U_NODES))
-                grid = part.points(face, u, v).reshape(*shape, 3)
-                diagonals = grid[1:, 1:] - grid[:-1, :-1], grid[1:, :-1] - grid[:-1, 1:]
-                areas.append(np.linalg.norm(np.cross(*diagonals), axis=-1).ravel() / 2)
-                a, b = u.reshape(shape), v.reshape(shape)
-                cell = np.empty((shape[0] - 1, shape[1] - 1, 6))
-                cell[..., 0], cell[..., 1] = self._slot_index[index], face
-                cell[..., 2], cell[..., 3] = a[:-1, :-1], a[:-1, 1:]
-                cell[..., 4], cell[..., 5] = b[:-1, :-1], b[1:, :-1]
-                rows.append(cell.reshape(-1, 6))
+        for slot, grid in zip(self._slot_index, self._grids, strict=True):
+            a, b, c, d = grid.points[grid.corners]
+            areas.append(np.linalg.norm(np.cross(c - a, d - b), axis=1) / 2)
+            cell = np.empty((len(a), 6))
+            low, high = grid.corners[0], grid.corners[2]
+            cell[:, 0], cell[:, 1] = slot, grid.face[low]
+            cell[:, 2], cell[:, 3] = grid.u[low], grid.u[high]
+            cell[:, 4], cell[:, 5] = grid.v[low], grid.v[high]
+            rows.append(cell)
         return np.concatenate(rows), np.cumsum(np.concatenate(areas))
 
     def sample_surface(self, count: int, rng: np.random.Generator) -> SurfaceSample:
@@ -174,11 +164,37 @@ def _between(low: Array, high: Array, mix: Array, disc: NDArray[np.bool_]) -> Ar
     return np.where(disc, squared, low + mix * (high - low))
 
 
-def _grids(part: Part) -> Iterator[tuple[int, Array, Array]]:
-    """For each face of a part: face, u and v of a grid's nodes, flattened with u fastest."""
-    for face in part.faces:
-        u, v = np.meshgrid(_U_NODES, _WALL_NODES if face >= WALL else _V_NODES)
-        yield face, u.ravel(), v.ravel()
+class _Grid:
+    """Nodes over all faces of a part: face, u, v (n,), points (n, 3); cells by their corners.
+
+    `corners` (4, m) are node indices in order around each cell, lowest (u, v) first.
+    """
+
+    def __init__(self, part: Part) -> None:
+        walls = len(part.windows)
+        plain = [np.full(_PLAIN_U.size, face) for face in (SIDE, CAP_START, CAP_STOP)]
+        wall = [np.full(_WALL_U.size, WALL + w.key) for w in part.windows]
+        self.face = np.concatenate([*plain, *wall])
+        self.u = np.concatenate([_PLAIN_U] * 3 + [_WALL_U] * walls)
+        self.v = np.concatenate([_PLAIN_V] * 3 + [_WALL_V] * walls)
+        self.points = part.points(self.face, self.u, self.v)
+        size, first = _PLAIN_U.size, 3 * _PLAIN_U.size
+        self.corners = np.concatenate(
+            [_PLAIN_CELLS + size * i for i in range(3)]
+            + [_WALL_CELLS + first + _WALL_U.size * i for i in range(walls)],
+            axis=1,
+        )
+
+
+def _nodes(v_nodes: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+    u, v = np.meshgrid(np.linspace(0, 1, 25), v_nodes)
+    node = np.arange(u.size).reshape(u.shape)
+    around = node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]
+    return u.ravel(), v.ravel(), np.stack([corner.ravel() for corner in around])
+
+
+_PLAIN_U, _PLAIN_V, _PLAIN_CELLS = _nodes((1 - np.cos(np.pi * np.linspace(0, 1, 15))) / 2)
+_WALL_U, _WALL_V, _WALL_CELLS = _nodes(np.array([0.0, 1.0]))
 
 
 class Family(ABC):
