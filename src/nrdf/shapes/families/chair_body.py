@@ -89,7 +89,7 @@ def _seat_shape(
 
     maps = [Warp(1, offset=offset)]
     if thickness > 0.025 and chance(rng, 0.5):
-        dome = rng.uniform(-0.3, 0.5) if thickness < 0.12 else rng.uniform(0, 0.35)
+        dome = rng.uniform(-0.3 if thickness < 0.12 else 0.0, 0.5) * min(1, 0.1 / thickness)
 
         def swell(z: Array, x: Array) -> Array:
             round_z = np.clip(1 - (z / (1.3 * half_width)) ** 2, 0.1, 1)
@@ -99,11 +99,10 @@ def _seat_shape(
     return maps
 
 
-def _outline(rng: np.random.Generator, bottom: float, upper: float) -> Curve:
-    """Half-width of a back along its height."""
-    kind = pick(
-        rng, {"straight": 4, "arch": 2.5, "bulge": 1.5, "oval": 0.8, "crest": 1.5, "head": 0.5}
-    )
+def _outline(rng: np.random.Generator, bottom: float, upper: float, plain: bool) -> Curve:
+    """Half-width of a back along its height; plain ones are wide all the way up."""
+    weights = {"straight": 4, "bulge": 1.5, "arch": 2.5, "oval": 0.8, "crest": 1.5, "head": 0.5}
+    kind = pick(rng, {name: weights[name] for name in list(weights)[: 2 if plain else None]})
     if kind == "bulge":
         middle = max(bottom, upper) * rng.uniform(0.85, 1.25)
         return smooth([0, rng.uniform(0.35, 0.65), 1], [bottom, middle, upper])
@@ -220,7 +219,10 @@ def random_back(rng: np.random.Generator, style: Style, kind: str, seat: Seat) -
     rear_width = seat.half_width * seat.width_at(-seat.half_depth)
     bottom_width = rear_width * rng.uniform(0.72, 1.02)
     top_width = bottom_width * rng.uniform(0.75, 1.2)
-    width = _outline(rng, bottom_width, top_width)
+    sofa = kind == "upholstered" and chance(rng, 0.6)
+    if sofa:
+        bottom_width, top_width = rear_width * rng.uniform([0.95, 0.9], [1.1, 1.15])
+    width = _outline(rng, bottom_width, top_width, plain=sofa)
     below = rng.uniform(0.3, 0.7) * seat.thickness
     x0 = -seat.half_depth + half * rng.uniform(-0.5, 1.2)
     floating = kind == "office" and chance(rng, 0.5)
@@ -256,7 +258,7 @@ def random_back(rng: np.random.Generator, style: Style, kind: str, seat: Seat) -
         b = rounded(b, 0, rng.uniform(0.03, 0.2), depth=rng.uniform(0.2, 0.8))
         width = rounded(width, 0, rng.uniform(0.02, 0.1), depth=rng.uniform(0.03, 0.2))
     pierced = chance(rng, style.pierced)
-    e = float(rng.choice([2.5, 4.0, 8.0, 20.0, 40.0]))
+    e = float(rng.choice([4.0, 6.0, 10.0, 20.0, 40.0]))
     part = Part(
         "back",
         1,

@@ -1,0 +1,291 @@
+"""Parametric families: exact occupancy, outward normals, exact correspondence."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from nrdf.errors import DataError
+from nrdf.shapes.families import FAMILY_NAMES, Family, Member, SurfaceCoordinates, get_family
+from nrdf.shapes.families.base import (
+    CAP_START,
+    CAP_STOP,
+    SIDE,
+    SKIN,
+    WALL,
+    Affine,
+    Part,
+    Warp,
+    Window,
+    rotation,
+)
+from nrdf.shapes.families.sections import Airfoil, Superellipse, linear, rounded, smooth
+
+SEEDS = range(12)
+EPS = 3e-4
+
+
+@pytest.fixture(scope="module", params=FAMILY_NAMES)
+def family(request: pytest.FixtureRequest) -> Family:
+    return get_family(request.param)
+
+
+@pytest.fixture(scope="module")
+def members(family: Family) -> list[Member]:
+    return [family.member(seed) for seed in SEEDS]
+
+
+def flips(member: Member, points: np.ndarray, normals: np.ndarray) -> float:
+    """Share of points with material just behind and none just in front."""
+    inside = member.occupancy(points - EPS * normals)
+    outside = ~member.occupancy(points + EPS * normals)
+    return float((inside & outside).mean())
+
+
+def test_an_unknown_family_is_refused_with_the_known_names() -> None:
+    with pytest.raises(DataError, match="no family 'boat'; known: chair, car, plane, table"):
+        get_family("boat")
+
+
+def test_a_seed_fixes_the_member(family: Family) -> None:
+    first, again = family.member(7), family.member(7)
+    one = first.sample_surface(300, np.random.default_rng(0))
+    two = again.sample_surface(300, np.random.default_rng(0))
+    np.testing.assert_array_equal(one.points, two.points)
+    np.testing.assert_array_equal(one.coordinates.slot, two.coordinates.slot)
+
+
+def test_a_generator_fixes_the_canonical_list(family: Family) -> None:
+    one, two = (
+        family.canonical_coordinates(300, np.random.default_rng(5), members=4) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one.u, two.u)
+    np.testing.assert_array_equal(one.slot, two.slot)
+
+
+def test_seeds_give_distinct_members(family: Family) -> None:
+    queries = np.random.default_rng(0).uniform(-0.5, 0.5, (1500, 3))
+    bits = {family.member(seed).occupancy(queries).tobytes() for seed in range(60)}
+    assert len(bits) == 60
+
+
+def test_members_are_canonical(members: list[Member]) -> None:
+    for member in members:
+        points = member.sample_surface(8000, np.random.default_rng(0)).points
+        assert np.abs(points).max() <= 0.5 + 1e-4
+        low, high = points.min(0), points.max(0)
+        assert (high - low).max() > 0.97  # pointed ends are seldom hit by a sample
+        outside = np.random.default_rng(1).uniform(-0.7, 0.7, (4000, 3))
+        outside = outside[np.abs(outside).max(1) > 0.5 + 1e-4]
+        assert not member.occupancy(outside).any()
+
+
+def test_surface_parts_inside_from_outside_and_normals_point_out(members: list[Member]) -> None:
+    for member in members:
+        sample = member.sample_surface(2048, np.random.default_rng(0))
+        np.testing.assert_allclose(np.linalg.norm(sample.normals, axis=1), 1, atol=1e-6)
+        assert flips(member, sample.points, sample.normals) >= 0.995
+
+
+def test_volume_agrees_with_the_divergence_theorem() -> None:
+    """Independent of occupancy: the volume is the surface integral of x·n / 3."""
+    member = get_family("table").member(3)
+    rng = np.random.default_rng(0)
+    queries = rng.uniform(-0.5, 0.5, (200_000, 3))
+    volume = member.occupancy(queries).mean()
+    sample = member.sample_surface(100_000, rng)
+    area = _visible_area(member, rng)
+    flux = area * (sample.points * sample.normals).sum(1).mean() / 3
+    assert flux == pytest.approx(volume, rel=0.04)
+
+
+def _visible_area(member: Member, rng: np.random.Generator) -> float:
+    """Area of the visible skin, canonical, by testing one random place in each surface cell."""
+    cells, area = member._cells
+    mix = rng.random((2, len(cells)))
+    coordinates = SurfaceCoordinates(
+        cells[:, 0].astype(np.int32),
+        cells[:, 1].astype(np.int32),
+        cells[:, 2] + mix[0] * (cells[:, 3] - cells[:, 2]),
+        cells[:, 4] + mix[1] * (cells[:, 5] - cells[:, 4]),
+    )
+    visible = member.locate(coordinates).exists
+    return float((np.diff(area, prepend=0.0) * visible).sum() / member.scale**2)
+
+
+def test_locating_its_own_coordinates_returns_its_own_points(members: list[Member]) -> None:
+    for member in members:
+        sample = member.sample_surface(1000, np.random.default_rng(0))
+        order = np.random.default_rng(1).permutation(1000)
+        located = member.locate(sample.coordinates[order])
+        assert located.exists.all()
+        np.testing.assert_allclose(located.points, sample.points[order], atol=1e-12)
+        np.testing.assert_allclose(located.normals, sample.normals[order], atol=1e-6)
+
+
+def test_locating_on_another_member_lands_on_its_surface(members: list[Member]) -> None:
+    shares = []
+    for one, other in pairwise(members):
+        sample = one.sample_surface(2048, np.random.default_rng(0))
+        located = other.locate(sample.coordinates)
+        points, normals = located.points[located.exists], located.normals[located.exists]
+        shares.append(located.exists.mean())
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+        assert flips(other, points, normals) >= 0.99
+        there_and_back = one.locate(sample.coordinates[located.exists])
+        np.testing.assert_allclose(there_and_back.points, sample.points[located.exists], atol=1e-12)
+    assert np.mean(shares) > 0.4
+
+
+def test_correspondence_keeps_left_and_right(family: Family, members: list[Member]) -> None:
+    side = np.array([("right" in s) - ("left" in s) for s in family.slots])
+    assert (side != 0).any()
+    for member in members:
+        sample = member.sample_surface(2048, np.random.default_rng(0))
+        sign = side[sample.coordinates.slot]
+        assert (sample.points[:, 2] * sign < -0.05).mean() < 0.01
+
+
+def test_a_slot_that_a_member_lacks_does_not_exist(family: Family) -> None:
+    members = [family.member(seed) for seed in range(40)]
+    having = {s: [m for m in members if s in {p.slot for p in m.parts}] for s in family.slots}
+    partial = [s for s in family.slots if 0 < len(having[s]) < len(members)]
+    assert partial, "every member has every slot: the topology does not vary"
+    for name in partial[:8]:
+        index = family.slot(name)
+        donor = having[name][0].sample_surface(3000, np.random.default_rng(0)).coordinates
+        mine = donor[np.flatnonzero(donor.slot == index)]
+        lacking = next(m for m in members if m not in having[name])
+        located = lacking.locate(mine)
+        assert not located.exists.any()
+        assert not located.points.any()
+
+
+def test_the_canonical_list_covers_every_slot_that_occurs(family: Family) -> None:
+    rng = np.random.default_rng(0)
+    coordinates = family.canonical_coordinates(1500, rng, members=60)
+    assert len(coordinates) == 1500
+    occurring = {p.slot for seed in range(15) for p in family.member(seed).parts}
+    listed = {family.slots[i] for i in np.unique(coordinates.slot)}
+    visible = {s for s in occurring if not s.startswith("caster")}
+    assert len(visible - listed) <= 0.1 * len(visible)
+    exists = [family.member(seed).locate(coordinates).exists.mean() for seed in SEEDS]
+    assert 0.15 < np.mean(exists) < 1
+
+
+def test_regions_are_named_and_found(family: Family) -> None:
+    coordinates = family.canonical_coordinates(3000, np.random.default_rng(0), members=40)
+    names = family.region_of(coordinates)
+    assert set(np.unique(names)) - {""} <= set(family.region_names)
+    for name in family.region_names:
+        mask = family.region(name, coordinates)
+        np.testing.assert_array_equal(mask, names == name)
+        assert mask.any(), name
+    with pytest.raises(ValueError, match="no region 'lid' in family"):
+        family.region("lid", coordinates)
+
+
+def test_chair_regions_face_the_right_way() -> None:
+    chair = get_family("chair")
+    for seed in range(20):
+        sample = chair.member(seed).sample_surface(2048, np.random.default_rng(0))
+        region = chair.region_of(sample.coordinates)
+        assert np.median(sample.normals[region == "seat", 1]) > 0.8
+        # a tub's back wraps around the sitter, so its front faces sideways as well
+        assert sample.normals[region == "back-front", 0].mean() > 0.3
+        assert sample.normals[region == "back-back", 0].mean() < -0.3
+        front, rear = (sample.points[region == f"back-{side}", 0] for side in ("front", "back"))
+        assert front.mean() > rear.mean()
+        assert sample.points[region == "seat", 0].mean() > front.mean()
+        for name in ("arm-left", "arm-right"):
+            if (region == name).sum() > 20:
+                assert np.median(sample.normals[region == name, 1]) > 0.7
+
+
+def test_a_slat_corresponds_to_the_solid_back_at_the_same_place() -> None:
+    outline = Superellipse(0.2, 0.02, 20.0)
+    solid = Part("back", 1, 0.0, 1.0, outline)
+    windows = tuple(Window(x, 0.5, 0.2, 0.3, key=i) for i, x in enumerate((-0.5, 0.5)))
+    slatted = Part("back", 1, 0.0, 1.0, outline, windows=windows)
+    one, two = (Member(("back",), [part]) for part in (solid, slatted))
+    sample = two.sample_surface(4000, np.random.default_rng(0))
+    on_solid = one.locate(sample.coordinates)
+    wall = sample.coordinates.face >= WALL
+    assert wall.sum() > 100
+    np.testing.assert_array_equal(on_solid.exists, ~wall)
+    np.testing.assert_allclose(on_solid.points[~wall], sample.points[~wall], atol=1e-12)
+    sample = one.sample_surface(4000, np.random.default_rng(0))
+    gap = (np.abs(np.abs(sample.points[:, 2]) - 0.1) < 0.04) & (np.abs(sample.points[:, 1]) < 0.3)
+    np.testing.assert_array_equal(two.locate(sample.coordinates).exists, ~gap)
+
+
+def test_a_buried_place_does_not_exist() -> None:
+    box = Superellipse(0.5, 0.5, np.float64(400.0))
+    lower = Part("lower", 1, 0.0, 1.0, box)
+    upper = Part("upper", 1, 1.0, 2.0, Superellipse(0.25, 0.25, 400.0))
+    member = Member(("lower", "upper"), [lower, upper])
+    ones = np.full(50, 0.5)
+    u = np.linspace(0.01, 0.99, 50)
+    bottom = SurfaceCoordinates(np.ones(50, np.int32), np.full(50, CAP_START, np.int32), u, ones)
+    assert not member.locate(bottom).exists.any()
+    top = SurfaceCoordinates(np.zeros(50, np.int32), np.full(50, CAP_STOP, np.int32), u, ones * 0.5)
+    assert not member.locate(top).exists.any()
+    rim = SurfaceCoordinates(top.slot, top.face, u, np.full(50, 0.9))
+    assert member.locate(rim).exists.all()
+
+
+MAPS = (
+    Warp(0, offset=lambda y, z: 0.2 * np.sin(3 * y) + z**2, scale=lambda y, z: 1.3 + 0.2 * y),
+    rotation(2, 0.7, pivot=(0.1, 0.2, 0.0)),
+    Warp(2, scale=lambda x, y: 1 + 0.3 * x, anchor=0.1),
+    Affine(np.diag([1.0, 1.0, -1.0])),
+)
+
+
+def test_maps_invert_exactly() -> None:
+    points = np.random.default_rng(0).uniform(-1, 1, (500, 3))
+    for step in MAPS:
+        np.testing.assert_allclose(step.inverse(step.forward(points)), points, atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize(
+    "section",
+    [
+        Superellipse(0.4, smooth([0, 0.5, 1], [0.1, 0.2, 0.1]), 2.0),
+        Superellipse(rounded(0.3, 0.3, 0.5), 0.2, 5.0, b_low=0.1, e_low=2.0),
+        Airfoil(linear([0, 1], [0.5, 0.3]), thickness=0.15, camber=0.03),
+    ],
+    ids=["ellipse", "egg", "airfoil"],
+)
+def test_a_warped_and_mirrored_part_keeps_its_skin(axis: int, section: Superellipse) -> None:
+    windows = (Window(0.1, 0.5, 0.3, 0.2, 3.0),)
+    bend = linear([0, 1], [0.0, 0.3]), 0.1
+    part = Part("a", axis, -0.5, 0.5, section, bend, windows).mapped(*MAPS)
+    member = Member(("a",), [part])
+    sample = member.sample_surface(3000, np.random.default_rng(0))
+    assert set(np.unique(sample.coordinates.face)) == {SIDE, CAP_START, CAP_STOP, WALL} or (
+        section.half_width(np.zeros(1)) == 0
+    )
+    assert flips(member, sample.points, sample.normals) >= 0.99
+
+
+def test_samples_are_even_by_area() -> None:
+    """A cylinder: the share of samples on side and caps, and radially within a cap."""
+    part = Part("a", 1, 0.0, 1.0, Superellipse(0.5, 0.5))
+    sample = Member(("a",), [part]).sample_surface(40_000, np.random.default_rng(0))
+    face, v = sample.coordinates.face, sample.coordinates.v
+    assert (face == SIDE).mean() == pytest.approx(2 / 3, abs=0.01)
+    assert (v[face != SIDE] < 0.5).mean() == pytest.approx(0.25, abs=0.015)
+    assert (v[face == SIDE] < 0.3).mean() == pytest.approx(0.3, abs=0.012)
+
+
+def test_a_part_in_the_wrong_direction_or_twice_in_a_slot_is_refused() -> None:
+    with pytest.raises(ValueError, match="must exceed start"):
+        Part("a", 0, 1.0, 0.0, Superellipse(1.0, 1.0))
+    part = Part("a", 0, 0.0, 1.0, Superellipse(1.0, 1.0))
+    with pytest.raises(ValueError, match="distinct slots"):
+        Member(("a",), [part, part])
+    assert SKIN < EPS
