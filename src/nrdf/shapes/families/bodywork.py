@@ -206,27 +206,3 @@ def _step(x: Array) -> Array:
     """0 below 0, 1 above 1, smooth between."""
     x = np.clip(x, 0, 1)
     return x * x * (3 - 2 * x)
-
-
-def semantic_station(
-    top: Sequence[float], side: Sequence[float]
-) -> Callable[[Array, Array], Array]:
-    """(u, v) to s: `top` holds s at TOP_V, used above the shoulder; `side` s at SIDE_V, below.
-
-    Between shoulder and belt line the two are mixed. The last interval at each end is spaced like
-    a quarter circle, because the ends are rounded.
-    """
-    top_s, side_s = np.asarray(top, float), np.asarray(side, float)
-
-    def along(v: Array, knots: Array, values: Array) -> Array:
-        s = np.interp(v, knots, values)
-        first, last = np.clip(1 - v / knots[1], 0, 1), np.clip(1 - (1 - v) / (1 - knots[-2]), 0, 1)
-        s = np.where(first > 0, values[1] * (1 - np.sin(np.pi / 2 * first)), s)
-        return np.where(last > 0, values[-2] + (1 - values[-2]) * np.sin(np.pi / 2 * last), s)
-
-    def station(u: Array, v: Array) -> Array:
-        u = u - np.floor(u)
-        mix = np.interp(np.minimum(u, 1 - u), [SHOULDER_U, BELT_U + 0.04], [1.0, 0.0])
-        return mix * along(v, TOP_V, top_s) + (1 - mix) * along(v, SIDE_V, side_s)
-
-    return station

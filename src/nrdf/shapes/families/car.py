@@ -24,6 +24,7 @@ from nrdf.shapes.families.base import (
     rotation,
 )
 from nrdf.shapes.families.bodywork import (
+    BELT_U,
     FLOOR_U,
     SHOULDER_U,
     SIDE_V,
@@ -32,12 +33,12 @@ from nrdf.shapes.families.bodywork import (
     End,
     Well,
     filleted,
-    semantic_station,
     shrinking,
 )
 from nrdf.shapes.families.car_styles import random_style
 from nrdf.shapes.families.member import Family
 from nrdf.shapes.families.sections import Superellipse, linear, rounded
+from nrdf.shapes.families.vehicle import blob, dish, semantic_station
 
 
 class CarFamily(Family):
@@ -174,7 +175,10 @@ def _body(d: Mapping[str, float], rng: np.random.Generator) -> tuple[Part, Bodyw
     )
     body = Part(
         "body", 0, 0.0, length, work, centre=(middle_y, 0.0),
-        maps=(warp,), station=semantic_station(stations, side),
+        maps=(warp,),
+        station=semantic_station(
+            (TOP_V, stations), (SIDE_V, side), (SHOULDER_U, BELT_U + 0.04)
+        ),
     )  # fmt: skip
     return body, work, warp
 
@@ -207,7 +211,7 @@ def _wheels(
     breadth = rng.uniform(0.18, 0.26)
     proud = rng.uniform(-0.03, 0.03)
     shoulder, blunt = rng.uniform(0.1, 0.3), rng.uniform(2.0, 4.0)
-    dish = rng.uniform(-0.25, 0.25)
+    hollow = rng.uniform(-0.02, 0.03)
     parts = []
     for name, well in (("rear", work.wells[0]), ("front", work.wells[1])):
         outer = _half_width(work, well.x, 1.4 * radius) + proud
@@ -223,29 +227,10 @@ def _wheels(
                 rounded(radius, 0.0, shoulder, blunt), rounded(radius, 0.0, shoulder, blunt)
             ),
             centre=(float(x), radius),
-            maps=(_dish(x, radius, 0.6 * radius, dish * 0.1, inner, outer),),
+            maps=(dish(2, inner, outer, (float(x), radius), 0.6 * radius, hollow),),
         )
         parts += [right, right.mirrored(f"wheel-{name}-left")]
     return parts
-
-
-def _dish(x: float, y: float, radius: float, depth: float, inner: float, outer: float) -> Warp:
-    """Pushes the hub in or out: a warp along z about the plane z = inner."""
-
-    def scale(px: Array, py: Array) -> Array:
-        near = np.clip(1 - ((px - x) ** 2 + (py - y) ** 2) / radius**2, 0, 1)
-        return 1 + depth / (outer - inner) * near
-
-    return Warp(2, scale=scale, anchor=inner)
-
-
-def _blob(
-    slot: str, axis: int, low: float, high: float, a: float, b: float, centre: tuple[float, float],
-    e: float = 2.5, ends: tuple[float, float] = (0.4, 0.4),
-) -> Part:  # fmt: skip
-    """A superellipse loft with rounded ends."""
-    section = Superellipse(rounded(a, *ends, 2.5), rounded(b, *ends, 2.5), e)
-    return Part(slot, axis, low, high, section, centre=centre)
 
 
 def _mirrors(
@@ -258,10 +243,8 @@ def _mirrors(
         return []
     x = float(_place(bow, (station * d["length"], y, root))[0])
     reach = rng.uniform(0.12, 0.24)
-    right = _blob(
-        "mirror-right", 2, root - 0.08, root + reach, rng.uniform(0.05, 0.09),
-        rng.uniform(0.06, 0.09), (x, y), ends=(0.0, 0.5),
-    )  # fmt: skip
+    half = rng.uniform(0.05, 0.09), rng.uniform(0.06, 0.09)
+    right = blob("mirror-right", 2, root - 0.08, root + reach, half, (x, y), ends=(0.0, 0.5))
     return [right, right.mirrored("mirror-left")]
 
 
@@ -274,7 +257,7 @@ def _bumpers(
     square = rng.uniform(3, 8)
     parts = []
     for slot, x in (("bumper-rear", 0.0), ("bumper-front", d["length"])):
-        bar = _blob(slot, 2, -half, half, depth, height, (x, y), square, (0.08, 0.08))
+        bar = blob(slot, 2, -half, half, (depth, height), (x, y), square, (0.08, 0.08))
         parts.append(bar.mapped(bow))
     return parts
 
@@ -289,12 +272,12 @@ def _spoiler(d: Mapping[str, float], work: Bodywork, rng: np.random.Generator) -
         half = min(half, 0.85 * _half_width(work, x + 0.8 * chord, y - 0.12))
         if half < 0.3:
             return []
-        return [_blob("spoiler", 2, -half, half, chord, 0.03, (x, y), 3.0, (0.15, 0.15))]
+        return [blob("spoiler", 2, -half, half, (chord, 0.03), (x, y), 3.0, (0.15, 0.15))]
     x = (1 - d["boot_edge"]) * length + chord
     deck = float(work.curves(np.array([x / length]))[1][0])
     lift = rng.choice([0.02, rng.uniform(0.12, 0.35)])
     y = deck + lift
-    blade = _blob("spoiler", 2, -half, half, chord, 0.025, (x, y), 2.5, (0.05, 0.05))
+    blade = blob("spoiler", 2, -half, half, (chord, 0.025), (x, y), 2.5, (0.05, 0.05))
     parts = [blade.mapped(rotation(2, rng.uniform(-0.2, 0.05), (x, y, 0)))]
     if lift > 0.1:
         z = half * rng.uniform(0.5, 0.8)
