@@ -9,6 +9,7 @@ import torch
 from torch import nn
 
 from nrdf.field.base import Field, FieldConfig, Inverse
+from nrdf.shapes.dataset import Correspondence, IndexRow, Shape, write_index, write_shape
 from nrdf.training.config import TrainConfig, load_config
 
 
@@ -30,7 +31,7 @@ class TinyField(Field):
             nn.Linear(width + 3, width), nn.ReLU(), nn.Dropout(self.config.dropout)
         )
         self.logit = nn.Linear(width, 1)
-        self.inverse = nn.Linear(2 * width + 3, 8)
+        self.inverse = nn.Sequential(nn.Linear(2 * width + 3, 32), nn.ReLU(), nn.Linear(32, 8))
 
     def embed(self, points, normals):
         return self.norm(self.encoder(torch.cat([points, normals], -1)).max(dim=1).values)
@@ -46,15 +47,10 @@ class TinyField(Field):
 
     def invert(self, z, k):
         out = self.inverse(torch.cat([z[:, None].expand(-1, k.shape[1], -1), k], -1))
-        points = k[..., -3:] + 0.1 * out[..., :3].tanh()
-        return Inverse(points, nn.functional.normalize(out[..., 3:6], dim=-1), out[..., 6], out[..., 7])
-
-
-@dataclass
-class Group:
-    points: np.ndarray
-    normals: np.ndarray
-    weight: np.ndarray
+        points = k[..., -3:] + 0.3 * out[..., :3].tanh()
+        return Inverse(
+            points, nn.functional.normalize(out[..., 3:6], dim=-1), out[..., 6], out[..., 7]
+        )
 
 
 @dataclass
@@ -80,7 +76,7 @@ class Ball:
         if self.missing:
             weight[:100] = 0
         for group in self.groups:
-            self.correspondences[group] = Group(points, normals, weight)
+            self.correspondences[group] = Correspondence(points, normals, weight)
 
     def on(self, rng, count):
         direction = rng.normal(size=(count, 3))
@@ -93,11 +89,33 @@ class Ball:
         return ((points / np.array(self.radii)) ** 2).sum(-1) < 1
 
 
-def balls(count=6, **kwargs) -> list[Ball]:
+def balls(number=6, **kwargs) -> list[Ball]:
     rng = np.random.default_rng(1)
     return [
-        Ball(f"ball-{i}", radii=(0.5, *rng.uniform(0.15, 0.45, 2)), **kwargs) for i in range(count)
+        Ball(f"ball-{i}", radii=(0.5, *rng.uniform(0.15, 0.45, 2)), **kwargs) for i in range(number)
     ]
+
+
+def write_folder(folder, shapes: list[Ball], val: int = 2) -> None:
+    """A data folder whose last `val` shapes are for validation."""
+    rows = []
+    for index, shape in enumerate(shapes):
+        write_shape(
+            folder / f"{shape.name}.npz",
+            Shape(
+                shape.name,
+                shape.category,
+                shape.source,
+                shape.surface_points,
+                shape.surface_normals,
+                shape.query_points,
+                shape.query_occupancies,
+                shape.correspondences,
+            ),
+        )
+        split = "train" if index < len(shapes) - val else "val"
+        rows.append(IndexRow(shape.name, shape.source, split, "CC0"))
+    write_index(folder, rows)
 
 
 def tiny_config(**changes) -> TrainConfig:

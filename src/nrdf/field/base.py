@@ -31,6 +31,8 @@ class Inverse(NamedTuple):
     """(b, m) logits: does the target have such a place at all?"""
     log_error: Tensor | None = None
     """(b, m) logarithm of the error that the field expects of `points`."""
+    first: Tensor | None = None
+    """(b, m, 3) where the field landed before it corrected itself, when it does."""
 
 
 class Field(nn.Module, ABC):

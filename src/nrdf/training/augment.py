@@ -69,9 +69,7 @@ class Deformation:
 
     def recanonicalised(self, surface: Tensor) -> Deformation:
         """The same map, followed by what makes the deformed surface (b, n, 3) canonical."""
-        plain = replace(
-            self, centre=torch.zeros_like(self.centre), size=torch.ones_like(self.size)
-        )
+        plain = replace(self, centre=torch.zeros_like(self.centre), size=torch.ones_like(self.size))
         moved = plain.points(surface)
         low, high = moved.min(dim=1).values, moved.max(dim=1).values
         return replace(self, centre=(low + high) / 2, size=(high - low).max(dim=1).values)

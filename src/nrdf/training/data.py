@@ -6,7 +6,6 @@ again, and every process of a distributed run draws its own.
 
 from __future__ import annotations
 
-import csv
 import logging
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -14,13 +13,13 @@ from copy import copy
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from nrdf.errors import ConfigError, DataError
+from nrdf.shapes.dataset import Shape, read_index, read_shape
 from nrdf.training.augment import draw_deformation, draw_sample
 from nrdf.training.config import AugmentConfig, DataConfig
 
@@ -28,25 +27,6 @@ log = logging.getLogger(__name__)
 
 CANDIDATES = 4
 """Correspondences tried for each one that is wanted; those without confidence drop out."""
-
-
-class CorrespondenceLike(Protocol):
-    points: np.ndarray
-    normals: np.ndarray
-    weight: np.ndarray
-
-
-class ShapeLike(Protocol):
-    """What is used of `nrdf.shapes.dataset.Shape`."""
-
-    name: str
-    category: str
-    source: str
-    surface_points: np.ndarray
-    surface_normals: np.ndarray
-    query_points: np.ndarray
-    query_occupancies: np.ndarray
-    correspondences: dict
 
 
 @dataclass(frozen=True)
@@ -86,7 +66,7 @@ class Bank:
     """
 
     def __init__(
-        self, shapes: Iterable[ShapeLike], config: DataConfig, device: torch.device | str = "cpu"
+        self, shapes: Iterable[Shape], config: DataConfig, device: torch.device | str = "cpu"
     ) -> None:
         self.config = config
         self.device = torch.device(device)
@@ -218,9 +198,7 @@ class Bank:
         """Steps in which as many shapes are seen as there are."""
         return max(1, len(self) // (sum(self.pool_sizes(batch_size)) * world))
 
-    def batch(
-        self, batch_size: int, seed: int, step: int, rank: int = 0, world: int = 1
-    ) -> Batch:
+    def batch(self, batch_size: int, seed: int, step: int, rank: int = 0, world: int = 1) -> Batch:
         """The batch of one step: at most `batch_size` shapes, each paired `rolls` times."""
         config = self.config
         generator = seeded(self.device, seed, step, rank)
@@ -366,50 +344,25 @@ def _pools(sources: list[str], shares: dict[str, float]) -> list[tuple[str, floa
 
 @dataclass(frozen=True)
 class Entry:
-    """A row of a data folder's `index.csv`."""
+    """A shape that a data folder lists."""
 
     path: Path
-    name: str
     source: str
     split: str
     licence: str
 
 
-def read_index(folders: Sequence[Path]) -> list[Entry]:
-    """The shapes that the folders list, in order.
-
-    Raises DataError for a folder without `index.csv`, or an index without the needed columns.
-    """
-    entries = []
-    for folder in folders:
-        index = folder / "index.csv"
-        if not index.is_file():
-            raise DataError(
-                f"{folder} is no data folder: it has no index.csv; make one with `nrdf prepare` "
-                "or `nrdf synth`"
-            )
-        with index.open(newline="", encoding="utf-8") as file:
-            rows = csv.DictReader(file)
-            missing = {"name", "source", "split", "licence"} - set(rows.fieldnames or ())
-            if missing:
-                raise DataError(f"{index} lacks the columns {', '.join(sorted(missing))}")
-            entries += [
-                Entry(
-                    folder / f"{row['name']}.npz",
-                    row["name"],
-                    row["source"],
-                    row["split"],
-                    row["licence"],
-                )
-                for row in rows
-            ]
-    return entries
+def list_shapes(folders: Sequence[Path]) -> list[Entry]:
+    """The shapes that the folders' `index.csv` list, in order (errors: `read_index`)."""
+    return [
+        Entry(folder / f"{row.name}.npz", row.source, row.split, row.licence)
+        for folder in folders
+        for row in read_index(folder)
+    ]
 
 
 def load_bank(
     entries: Sequence[Entry], split: str, config: DataConfig, device: torch.device | str
 ) -> Bank:
-    """The shapes of one split (train, val, test) in memory."""
-    from nrdf.shapes.dataset import read_shape
-
+    """The shapes of one split (train, val, test) in memory (errors: `read_shape`, `Bank`)."""
     return Bank((read_shape(e.path) for e in entries if e.split == split), config, device)

@@ -35,7 +35,7 @@ from nrdf.training.checkpoint import (
     write_identity,
 )
 from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
-from nrdf.training.data import Bank, Batch, Entry, load_bank, read_index, seeded
+from nrdf.training.data import Bank, Batch, Entry, list_shapes, load_bank, seeded
 from nrdf.training.distributed import Workers, choose_precision, join_workers
 from nrdf.training.losses import LOSSES, Forward
 from nrdf.training.progress import Display
@@ -68,7 +68,7 @@ def train(
     """
     out = Path(out)
     with join_workers(device) as workers:
-        entries = read_index([Path(folder) for folder in data])
+        entries = list_shapes([Path(folder) for folder in data])
         bank = load_bank(entries, "train", config.data, workers.device)
         if bank.categories != {category}:
             raise DataError(
@@ -81,7 +81,7 @@ def train(
             identity = {
                 "config": config.model_dump(mode="json"),
                 "category": category,
-                "shapes": sorted(bank.names),
+                "shapes": bank.names,
             }
             if not open_run(out, identity, overwrite):
                 write_identity(out, identity, environment(workers))
@@ -211,9 +211,7 @@ class Objective(nn.Module):
         self._cloud_points = config.data.cloud_points
         self._precision = precision
 
-    def forward(
-        self, batch: Batch, generator: torch.Generator
-    ) -> tuple[Tensor, dict[str, Tensor]]:
+    def forward(self, batch: Batch, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """The sum () with gradient, and every loss () before weighting, without."""
         device = batch.points.device.type
         with torch.autocast(device, self._precision, self._precision != torch.float32):

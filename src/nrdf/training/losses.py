@@ -93,9 +93,7 @@ class Forward:
 
 def chamfer_distance(a: Tensor, b: Tensor) -> Tensor:
     """Mean squared distance to the nearest point, both directions summed: a, b (b, n|m, 3)."""
-    return (
-        nearest_distance(a, b, squared=True).mean() + nearest_distance(b, a, squared=True).mean()
-    )
+    return nearest_distance(a, b, squared=True).mean() + nearest_distance(b, a, squared=True).mean()
 
 
 def earth_movers_distance(a: Tensor, b: Tensor) -> Tensor:
@@ -135,8 +133,8 @@ def descriptor_smoothness(f: Forward) -> Tensor:
     """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
     b, c, _ = f.cloud.shape
     rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
-    apart, around = (
-        distances(f.cloud[:, rows], f.cloud).topk(min(17, c), dim=2, largest=False, sorted=True)
+    apart, around = distances(f.cloud[:, rows], f.cloud).topk(
+        min(17, c), dim=2, largest=False, sorted=True
     )
     apart, around = apart[:, :, 1:], around[:, :, 1:]
     k = f.descriptors.float()
@@ -148,9 +146,7 @@ def normal_consistency(f: Forward) -> Tensor:
     """(6): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
     by local PCA, its sign from the normal that x had on shape i."""
     ours = local_normals(f.cross, towards=f.cloud_normals)
-    theirs = gather(
-        f.cloud_normals[f.partner], nearest_indices(f.cross, f.cloud[f.partner])
-    )
+    theirs = gather(f.cloud_normals[f.partner], nearest_indices(f.cross, f.cloud[f.partner]))
     return (1 - (ours * theirs).sum(-1)).mean()
 
 
@@ -170,6 +166,15 @@ def correspondence(f: Forward) -> Tensor:
     """Weighted mean of √(d² + ε²) − ε, d from C(z_j, θ(z_i, x)) to the known place of x on
     shape j; ε = 0.01 keeps doubtful correspondences from ruling (not in the paper)."""
     square = (f.match.points.float() - f.batch.target).square().sum(-1)
+    return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, f.batch.weight)
+
+
+def landing(f: Forward) -> Tensor:
+    """`correspondence` of where C first landed, before its local look (not in the paper). Zero
+    for a field that looks once only."""
+    if f.match.first is None:
+        return f.z.new_zeros(())
+    square = (f.match.first.float() - f.batch.target).square().sum(-1)
     return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, f.batch.weight)
 
 
@@ -214,6 +219,7 @@ LOSSES: dict[str, Callable[[Forward], Tensor]] = {
     "normal_consistency": normal_consistency,
     "descriptor_distance": descriptor_distance,
     "correspondence": correspondence,
+    "landing": landing,
     "normal": normal,
     "existence": existence,
     "error_scale": error_scale,

@@ -100,8 +100,9 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
 
     Auction (Bertsekas 1988), all batch elements at once: every bidder without an object bids for
     its best one, by what it is better than its second best plus `eps`; the highest bid takes the
-    object. The few left after `iterations` rounds are assigned exactly. The mean distance is
-    within `eps` of the optimum once the auction has ended.
+    object. The few left after `iterations` rounds share the objects left, at least cost. The mean
+    distance is within `eps` of the optimum once the auction has ended (some 1000 rounds for 1000
+    unrelated points); after 50 it is about a tenth too large for unrelated clouds, the worst case.
     """
     count, n, _ = a.shape
     if b.shape != a.shape:
@@ -122,9 +123,7 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
         bid = price[wanted] + margin + eps
         highest = torch.full_like(price, -torch.inf).scatter_reduce_(0, wanted, bid, "amax")
         high = bid == highest[wanted]
-        winner = torch.full_like(owner, -1).scatter_reduce_(
-            0, wanted[high], bidder[high], "amax"
-        )
+        winner = torch.full_like(owner, -1).scatter_reduce_(0, wanted[high], bidder[high], "amax")
         sold = winner >= 0
         loser = owner[sold & (owner >= 0)]
         chosen[loser] = -1

@@ -76,7 +76,12 @@ class Display:
             self._bar.update(self._task, completed=step, description=stage, numbers=numbers)
         else:
             log.info(
-                "%s %d/%d  %s  %.2f s/step, %s left", stage, step, self._total, numbers, each,
+                "%s %d/%d  %s  %.2f s/step, %s left",
+                stage,
+                step,
+                self._total,
+                numbers,
+                each,
                 f"{left / 60:.0f} min" if left > 90 else f"{left:.0f} s",
             )
 
