@@ -1,0 +1,42 @@
+# make demo: an environment, then nrdf at work on bundled shapes, in demo/
+# make test: an environment with the tools, then ruff, mypy and all tests
+# Another interpreter: make PYTHON=/path/to/python3.12 test
+
+VENV := .venv
+BIN := $(VENV)/bin
+CANDIDATES := python3 python3.11 python3.12 python3.10 python3.13
+SUITABLE := -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))'
+PYTHON ?= $(shell for name in $(CANDIDATES); do \
+	$$name $(SUITABLE) 2>/dev/null && { echo $$name; break; }; done)
+
+.PHONY: demo test format clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/nrdf.stamp
+	$(BIN)/nrdf demo --out demo --overwrite
+
+test: $(VENV)/dev.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest
+
+format: $(VENV)/dev.stamp
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "no python3 of version 3.10 or newer with venv found;" \
+		"install one, or name it: make PYTHON=/path/to/python3" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/nrdf.stamp: pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/dev.stamp: pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@ $(VENV)/nrdf.stamp
+
+clean:
+	rm -rf $(VENV) demo
