@@ -23,7 +23,10 @@ def forward():
     return Forward(TinyField(), batch, torch.Generator().manual_seed(0), config.cloud_points)
 
 
-@pytest.mark.parametrize("name", sorted(LOSSES))
+TRAINING = sorted(LOSSES.keys() - {"landing"})  # the tiny field looks once
+
+
+@pytest.mark.parametrize("name", TRAINING)
 def test_every_loss_is_finite_and_trains_the_field(forward, name):
     value = LOSSES[name](forward)
     assert value.shape == () and value.isfinite()
@@ -33,7 +36,7 @@ def test_every_loss_is_finite_and_trains_the_field(forward, name):
     assert sum(float(gradient.abs().sum()) for gradient in gradients) > 0
 
 
-@pytest.mark.parametrize("name", sorted(LOSSES))
+@pytest.mark.parametrize("name", TRAINING)
 def test_every_loss_falls_when_it_is_followed(forward, name):
     optimizer = torch.optim.Adam(forward.field.parameters(), 5e-4)
     values = []
@@ -116,7 +119,9 @@ def test_error_scale_is_least_at_the_true_error_and_does_not_move_points():
 
 def test_fields_without_extra_predictions_lose_nothing_by_them():
     bare = pair(Inverse(torch.zeros(1, 1, 3)), target=torch.zeros(1, 1, 3), weight=torch.ones(1, 1))
-    assert all(float(LOSSES[name](bare)) == 0 for name in ("normal", "existence", "error_scale"))
+    assert all(
+        float(LOSSES[name](bare)) == 0 for name in ("normal", "existence", "error_scale", "landing")
+    )
 
 
 def test_self_and_cross_reconstruction_meet_their_own_targets(forward):

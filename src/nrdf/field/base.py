@@ -59,7 +59,7 @@ class Field(nn.Module, ABC):
 
     @abstractmethod
     def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> Tensor:
-        """Descriptors k (b, m, d_k) of points (b, m, 3) with normals on the shapes of z (b, d_z)."""
+        """Descriptors k (b, m, d_k) of points (b, m, 3) with normals, on the shapes of z."""
 
     @abstractmethod
     def invert(self, z: Tensor, k: Tensor) -> Inverse:

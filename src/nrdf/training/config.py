@@ -20,43 +20,43 @@ class Strict(BaseModel):
 class AugmentConfig(Strict):
     """Random changes of the shapes; 0 switches one off."""
 
-    scaling: float = Field(0.0, ge=0)
+    scaling: float = Field(default=0.0, ge=0)
     """Standard deviation of the logarithm of each axis's scale."""
-    warp: float = Field(0.0, ge=0)
+    warp: float = Field(default=0.0, ge=0)
     """Standard deviation of each of the low-frequency waves' displacement (canonical lengths)."""
     mirror: bool = False
     """Mirror left and right, both shapes of a pair alike."""
-    density: float = Field(0.0, ge=0)
+    density: float = Field(default=0.0, ge=0)
     """Largest standard deviation of the logarithm of the encoder points' density."""
-    noise: float = Field(0.0, ge=0)
+    noise: float = Field(default=0.0, ge=0)
     """Largest standard deviation of the encoder points' noise (canonical lengths)."""
-    normal_noise: float = Field(0.0, ge=0)
+    normal_noise: float = Field(default=0.0, ge=0)
     """Largest standard deviation added to each coordinate of the encoder's normals."""
-    holes: int = Field(0, ge=0)
-    hole_radius: float = Field(0.1, ge=0)
+    holes: int = Field(default=0, ge=0)
+    hole_radius: float = Field(default=0.1, ge=0)
 
 
 class DataConfig(Strict):
     """How many points of what a batch holds, and which shapes meet in it."""
 
-    encoder_points: int = Field(1024, ge=1)
-    queries: int = Field(256, ge=0)
+    encoder_points: int = Field(default=1024, ge=1)
+    queries: int = Field(default=256, ge=0)
     """Occupancy queries a shape."""
-    correspondences: int = Field(256, ge=0)
+    correspondences: int = Field(default=256, ge=0)
     """Corresponding points a pair."""
-    rolls: int = Field(1, ge=1)
+    rolls: int = Field(default=1, ge=1)
     """Partners that each encoded shape is paired with: the next, the one after it, ..."""
-    cloud_points: int = Field(1024, ge=2)
+    cloud_points: int = Field(default=1024, ge=2)
     """Points a shape for the losses on whole clouds (self, chamfer, emd, ...)."""
-    surface_points: int = Field(8192, ge=1)
+    surface_points: int = Field(default=8192, ge=1)
     """Surface points a shape kept in memory to draw from."""
-    stored_queries: int = Field(20000, ge=1)
+    stored_queries: int = Field(default=20000, ge=1)
     pools: dict[str, float] = {}
     """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
     within a pool. Empty: one pool of all shapes."""
     exact_groups: list[str] = ["family-*", "gsnet"]
     """Patterns of correspondence groups whose weight 0 is a fact ("no such place"), not a doubt."""
-    weight_threshold: float = Field(0.05, ge=0, le=1)
+    weight_threshold: float = Field(default=0.05, ge=0, le=1)
     """Correspondences of less confidence are not drawn."""
     augment: AugmentConfig = AugmentConfig()
 
@@ -67,15 +67,15 @@ class Stage(Strict):
     name: str
     weights: dict[str, float] = Field(min_length=1)
     """Loss name to weight (`nrdf.training.losses.LOSSES`)."""
-    epochs: float | None = Field(None, gt=0)
-    steps: int | None = Field(None, gt=0)
-    batch_size: int = Field(8, ge=2)
+    epochs: float | None = Field(default=None, gt=0)
+    steps: int | None = Field(default=None, gt=0)
+    batch_size: int = Field(default=8, ge=2)
     """Shapes a step, on each process."""
     parts: list[str] | Literal["all"] = "all"
     """Names of the field's parts that train; the others are frozen."""
-    rate: float = Field(1e-4, gt=0)
+    rate: float = Field(default=1e-4, gt=0)
     schedule: Literal["constant", "cosine"] = "constant"
-    warmup: int = Field(0, ge=0)
+    warmup: int = Field(default=0, ge=0)
     """Steps over which the rate rises linearly from zero."""
 
     @field_validator("weights")
@@ -98,8 +98,8 @@ class Stage(Strict):
 class OptimizerConfig(Strict):
     name: Literal["adam", "adamw"] = "adam"
     betas: tuple[float, float] = (0.9, 0.999)
-    weight_decay: float = Field(0.0, ge=0)
-    clip: float | None = Field(None, gt=0)
+    weight_decay: float = Field(default=0.0, ge=0)
+    clip: float | None = Field(default=None, gt=0)
     """Bound on the gradient's norm."""
 
 
@@ -112,14 +112,14 @@ class TrainConfig(Strict):
     stages: list[Stage] = Field(min_length=1)
     data: DataConfig = DataConfig()
     optimizer: OptimizerConfig = OptimizerConfig()
-    seed: int = Field(0, ge=0)
+    seed: int = Field(default=0, ge=0)
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """auto: bfloat16 where it pays (CUDA; CPUs with AMX)."""
-    ema: float | None = Field(None, gt=0, lt=1)
+    ema: float | None = Field(default=None, gt=0, lt=1)
     """Decay of the moving average of the weights, which is what is exported; None: no average."""
-    checkpoint_every: int = Field(500, ge=1)
-    validate_every: int = Field(500, ge=1)
-    log_every: int = Field(20, ge=1)
+    checkpoint_every: int = Field(default=500, ge=1)
+    validate_every: int = Field(default=500, ge=1)
+    log_every: int = Field(default=20, ge=1)
 
 
 CONFIG_FOLDER = Path(__file__).resolve().parents[3] / "configs"

@@ -102,6 +102,7 @@ class Bank:
             raise DataError("no training shapes; prepare some (`nrdf prepare` or `nrdf synth`)")
         self.surface = torch.stack(surface).to(self.device)
         self.surface_normals = torch.stack(normals).to(self.device)
+        self.extremes = torch.cat([self.surface.argmin(1), self.surface.argmax(1)], dim=1)
         self.queries = torch.stack(queries).to(self.device)
         self.occupancies = torch.stack(occupancies).to(self.device)
         self._stack_groups(groups)
@@ -213,6 +214,8 @@ class Bank:
 
         count = min(config.encoder_points, surface.shape[1])
         sample = draw_sample(config.augment, surface, count, generator)
+        if count > 6:  # as at inference: the embedding must know the bounding box exactly
+            sample = torch.cat([self.extremes[chosen], sample[:, 6:]], dim=1)
         rows = torch.arange(len(chosen), device=self.device)[:, None]
         points, normals = surface[rows, sample], self.surface_normals[chosen[:, None], sample]
         clean_points, clean_normals = deform.points(points), deform.normals(points, normals)

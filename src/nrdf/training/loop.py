@@ -141,7 +141,8 @@ def run_stages(
             objective: nn.Module = Objective(field, stage, config, precision)
             if workers.world > 1:
                 objective = DistributedDataParallel(objective, find_unused_parameters=True)
-            sums, counted, skipped = defaultdict(float), 0, 0
+            sums: defaultdict[str, Tensor | float] = defaultdict(float)
+            counted, skipped = 0, 0
 
             for step in range(position.step, length):
                 seed = config.seed + 7919 * number

@@ -107,6 +107,12 @@ def weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
     return (values * weight).sum() / weight.sum().clamp_min(1e-6)
 
 
+def robust_distance(points: Tensor, batch: Batch) -> Tensor:
+    """Weighted mean of √(d² + ε²) − ε, d from points (p, m, 3) to the batch's targets."""
+    square = (points.float() - batch.target).square().sum(-1)
+    return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, batch.weight)
+
+
 def occupancy(f: Forward) -> Tensor:
     """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
     return functional.binary_cross_entropy_with_logits(f.logits, f.batch.occupancy)
@@ -131,7 +137,7 @@ def emd(f: Forward) -> Tensor:
 
 def descriptor_smoothness(f: Forward) -> Tensor:
     """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
-    b, c, _ = f.cloud.shape
+    c = f.cloud_points
     rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
     apart, around = distances(f.cloud[:, rows], f.cloud).topk(
         min(17, c), dim=2, largest=False, sorted=True
@@ -165,8 +171,7 @@ def descriptor_distance(f: Forward) -> Tensor:
 def correspondence(f: Forward) -> Tensor:
     """Weighted mean of √(d² + ε²) − ε, d from C(z_j, θ(z_i, x)) to the known place of x on
     shape j; ε = 0.01 keeps doubtful correspondences from ruling (not in the paper)."""
-    square = (f.match.points.float() - f.batch.target).square().sum(-1)
-    return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, f.batch.weight)
+    return robust_distance(f.match.points, f.batch)
 
 
 def landing(f: Forward) -> Tensor:
@@ -174,8 +179,7 @@ def landing(f: Forward) -> Tensor:
     for a field that looks once only."""
     if f.match.first is None:
         return f.z.new_zeros(())
-    square = (f.match.first.float() - f.batch.target).square().sum(-1)
-    return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, f.batch.weight)
+    return robust_distance(f.match.first, f.batch)
 
 
 def normal(f: Forward) -> Tensor:

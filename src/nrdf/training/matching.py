@@ -118,7 +118,7 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
         if len(bidder) == 0:
             break
         element = bidder // n
-        best, wanted, margin = _best_objects(cost, price.view(count, n), bidder, element)
+        wanted, margin = _best_objects(cost, price.view(count, n), bidder, element)
         wanted = wanted + element * n
         bid = price[wanted] + margin + eps
         highest = torch.full_like(price, -torch.inf).scatter_reduce_(0, wanted, bid, "amax")
@@ -136,16 +136,16 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
 
 def _best_objects(
     cost: Tensor, price: Tensor, bidder: Tensor, element: Tensor
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Value and index of each bidder's best object, and its lead over the second best."""
+) -> tuple[Tensor, Tensor]:
+    """Index of each bidder's best object, and its lead over the second best."""
     parts = []
     for rows in _chunks(len(bidder), cost.shape[1], 1):
         value = -cost[bidder[rows]] - price[element[rows]]
         best, wanted = value.max(dim=1)
         value.scatter_(1, wanted[:, None], -torch.inf)
-        parts.append((best, wanted, best - value.max(dim=1).values))
-    best, wanted, margin = (torch.cat(column) for column in zip(*parts, strict=True))
-    return best, wanted, margin
+        parts.append((wanted, best - value.max(dim=1).values))
+    wanted, margin = (torch.cat(column) for column in zip(*parts, strict=True))
+    return wanted, margin
 
 
 def _assign_rest(cost: Tensor, chosen: Tensor) -> Tensor:
