@@ -1,0 +1,46 @@
+"""What can go wrong, each with a message that says what was wrong, what would be right, what to do.
+
+Every error that a user can cause derives from `NrdfError`; the command line prints its message
+without a traceback and ends with its `exit_code`.
+"""
+
+from __future__ import annotations
+
+
+class NrdfError(Exception):
+    """Base of every error raised for bad input, bad files or bad options."""
+
+    exit_code = 2
+
+
+class CloudError(NrdfError):
+    """A point cloud that cannot be used: unreadable, empty, too small, flat, not finite."""
+
+
+class RegionError(NrdfError):
+    """A region of interest that is empty or does not lie on its reference."""
+
+
+class ModelError(NrdfError):
+    """An unknown model, a damaged weight file, or weights of another preset or category."""
+
+
+class DataError(NrdfError):
+    """A training set, mesh or benchmark folder that cannot be used."""
+
+
+class ConfigError(NrdfError):
+    """An unknown preset, option or value in a configuration file."""
+
+
+class TrainingError(NrdfError):
+    """A training run that cannot go on: losses that stay infinite or undefined."""
+
+
+class OutputError(NrdfError):
+    """An output folder that is not empty, or that cannot be written."""
+
+
+def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> str:
+    """Message for a name that is not known: "no {kind} '{name}'; known: a, b, c"."""
+    return f"no {kind} '{name}'; known: {', '.join(known) if known else '(none)'}"

@@ -1,0 +1,56 @@
+"""From a mapped reference to the target's own points (paper, section III-D and eq. 9)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+NORMAL_WEIGHT = 0.1
+"""Canonical length that one unit of normal difference counts for: tells thin sides apart."""
+VOTERS = 7
+"""Mapped reference points that each target point asks."""
+
+
+def oriented_features(points: np.ndarray, normals: np.ndarray, weight: float) -> np.ndarray:
+    """Positions and weighted normals side by side, (n, 6), for nearest neighbours in both."""
+    return np.concatenate([points, weight * normals], axis=1)
+
+
+def snap(
+    mapped: np.ndarray,
+    mapped_normals: np.ndarray,
+    target: np.ndarray,
+    target_normals: np.ndarray,
+    normal_weight: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Each mapped point's nearest target point: its index (m,) and distance (m,).
+
+    mapped (m, 3), target (n, 3) canonical; normals of the same shapes, used when `normal_weight`
+    is above 0.
+    """
+    tree = cKDTree(oriented_features(target, target_normals, normal_weight))
+    distance, index = tree.query(
+        oriented_features(mapped, mapped_normals, normal_weight), workers=-1
+    )
+    return index, distance
+
+
+def voters(
+    mapped: np.ndarray,
+    mapped_normals: np.ndarray,
+    target: np.ndarray,
+    target_normals: np.ndarray,
+    normal_weight: float = NORMAL_WEIGHT,
+    count: int = VOTERS,
+) -> tuple[np.ndarray, np.ndarray]:
+    """For each target point, the mapped reference points nearest in (position, normal).
+
+    Returns their indices (n, count) into `mapped` and distances (n, count).
+    """
+    tree = cKDTree(oriented_features(mapped, mapped_normals, normal_weight))
+    distance, index = tree.query(
+        oriented_features(target, target_normals, normal_weight),
+        k=np.arange(1, min(count, len(mapped)) + 1),
+        workers=-1,
+    )
+    return index, distance

@@ -1,0 +1,328 @@
+"""The class that users need: teach a reference once, find its regions on every new object.
+
+    model = nrdf.load_model("chair")
+    taught = model.set_reference(reference)
+    match = taught.retrieve(region, target)
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+
+from nrdf.cloud import PointCloud, check_cloud
+from nrdf.errors import RegionError, unknown_name
+from nrdf.field.base import Field
+from nrdf.geometry import canonical_transform, estimate_normals, thin
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.region import region_indices
+
+log = logging.getLogger(__name__)
+
+METHODS = ("mask", "points")
+WORKING_POINTS = 16384
+"""A denser cloud is thinned to this many points; results are carried back to all of its points."""
+MINIMUM_POINTS = 256
+_CHUNK = 8192
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
+
+    cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
+    canonical. centre (3,), scale: canonical = (original - centre) / scale. z: (1, d_z).
+    seconds: time of each phase.
+    """
+
+    cloud: PointCloud
+    working: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    centre: np.ndarray
+    scale: float
+    z: torch.Tensor
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def original(self, points_canonical: np.ndarray) -> np.ndarray:
+        """Canonical points (m, 3) in the cloud's own frame and unit."""
+        return np.asarray(points_canonical, np.float64) * self.scale + self.centre
+
+    def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Selected working points as indices of the whole cloud, and which working point each
+        follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
+        """
+        if len(self.working) == len(self.cloud.points):
+            index = np.flatnonzero(selected)
+            return index, index
+        nearest = self._nearest_working()
+        index = np.flatnonzero(selected[nearest])
+        return index, nearest[index]
+
+    def _nearest_working(self) -> np.ndarray:
+        from scipy.spatial import cKDTree
+
+        if "nearest" not in self.__dict__:  # the cloud is large: asked once for all regions
+            points = (self.cloud.points - self.centre) / self.scale
+            nearest = cKDTree(self.points).query(points, workers=-1)[1]
+            object.__setattr__(self, "nearest", nearest)
+        return self.__dict__["nearest"]
+
+
+@dataclass(frozen=True)
+class Match:
+    """A region found on a target.
+
+    indices: (k,) the target's own points in the region, ascending.
+    points: (m, 3) where C puts each point of the reference's region, in its order, in the
+        target's frame and unit (raw prediction, off the surface by the field's error).
+    confidence: (k,) in [0, 1], for each of `indices`.
+    method: "mask" or "points".
+    """
+
+    indices: np.ndarray
+    points: np.ndarray
+    confidence: np.ndarray
+    method: str
+
+    @property
+    def score(self) -> float:
+        """Mean confidence of the region's points; 0 for an empty region."""
+        return float(self.confidence.mean()) if len(self.confidence) else 0.0
+
+
+class Model:
+    """A trained field of one category, ready to be taught references.
+
+    field: the network; metadata: what its weight file says of itself (category, preset, ...).
+    """
+
+    def __init__(
+        self, field: Field, metadata: Mapping[str, Any], device: torch.device | str = "cpu"
+    ) -> None:
+        self.device = torch.device(device)
+        self.field = field.to(self.device).eval()
+        self.metadata = dict(metadata)
+
+    @property
+    def category(self) -> str:
+        return str(self.metadata.get("category", ""))
+
+    @property
+    def preset(self) -> str:
+        return self.field.preset
+
+    def __repr__(self) -> str:
+        return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"
+
+    def embed(self, cloud: PointCloud) -> Embedded:
+        """Thin, orient, normalise and embed a cloud in the category's canonical frame.
+
+        Any unit, centre and scale will do. Normals are used as they are, or estimated where there
+        are none. Raises CloudError for a cloud that is empty, flat, or has too few points.
+        """
+        check_cloud(cloud, MINIMUM_POINTS)
+        seconds: dict[str, float] = {}
+        start = time.perf_counter()
+        centre, scale = canonical_transform(cloud.points)
+        working = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        points = (cloud.points[working] - centre) / scale
+        seconds["normalise"] = time.perf_counter() - start
+        start = time.perf_counter()
+        normals = estimate_normals(points) if cloud.normals is None else cloud.normals[working]
+        seconds["normals"] = time.perf_counter() - start
+        start = time.perf_counter()
+        chosen = encoder_subset(points, self.field.config.encoder_points)
+        with torch.inference_mode():
+            z = self.field.embed(self._tensor(points[chosen]), self._tensor(normals[chosen]))
+        seconds["embed"] = time.perf_counter() - start
+        return Embedded(cloud, working, points, normals, centre, scale, z, seconds)
+
+    def set_reference(self, reference: PointCloud) -> Taught:
+        """Embed a reference and describe its surface once, for any number of targets."""
+        return Taught(self, self.embed(reference))
+
+    def _tensor(self, values: np.ndarray) -> torch.Tensor:
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device)[None]
+
+
+class Taught:
+    """A reference whose descriptors are known (paper, eq. 8)."""
+
+    def __init__(self, model: Model, reference: Embedded) -> None:
+        self.model = model
+        self.reference = reference
+        self._k = self._describe(reference.points, reference.normals)
+
+    def retrieve(
+        self, region: Any, target: PointCloud | Embedded, method: str = "mask"
+    ) -> Match:
+        """Find one region on a target: `retrieve_all` for a single region."""
+        return self.retrieve_all({"region": region}, target, method)["region"]
+
+    def retrieve_all(
+        self, regions: Mapping[str, Any], target: PointCloud | Embedded, method: str = "mask"
+    ) -> dict[str, Match]:
+        """Find regions on a target, which is embedded and mapped once for all of them.
+
+        regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
+        method: "mask" maps the whole reference and lets each target point ask the mapped
+        reference points nearest in position and normal; "points" snaps C's prediction of each
+        region point to the target (paper, eq. 9).
+
+        Raises RegionError for a region that is empty or not on the reference, or an unknown
+        method.
+        """
+        if method not in METHODS:
+            raise RegionError(unknown_name("method", method, METHODS))
+        chosen = {}
+        for name, region in regions.items():
+            try:
+                chosen[name] = region_indices(region, self.reference.cloud)
+            except RegionError as error:
+                raise RegionError(f"region '{name}': {error}") from None
+        embedded = target if isinstance(target, Embedded) else self.model.embed(target)
+        if method == "mask":
+            return self._by_mask(chosen, embedded)
+        return {name: self._by_points(indices, embedded) for name, indices in chosen.items()}
+
+    def map_surface(self, target: Embedded) -> Mapped:
+        """Where the reference's working points arrive on a target: C(z_t, k_r)."""
+        return self._invert(target, self._k, self.reference.normals)
+
+    def map_points(self, indices: np.ndarray, target: Embedded) -> Mapped:
+        """Where reference points given by their indices (m,) in the cloud arrive on a target."""
+        reference = self.reference
+        if len(reference.working) == len(reference.cloud.points):
+            return self._invert(target, self._k[:, indices], reference.normals[indices])
+        points = (reference.cloud.points[indices] - reference.centre) / reference.scale
+        given = reference.cloud.normals
+        normals = (
+            given[indices]
+            if given is not None
+            else reference.normals[reference._nearest_working()[indices]]
+        )
+        return self._invert(target, self._describe(points, normals), normals)
+
+    def _by_mask(self, chosen: dict[str, np.ndarray], target: Embedded) -> dict[str, Match]:
+        start = time.perf_counter()
+        mapped = self.map_surface(target)
+        target.seconds["map"] = time.perf_counter() - start
+        start = time.perf_counter()
+        asked, distance = voters(
+            mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
+        )
+        trust = mapped.trust[asked] * np.exp(-distance / _DISTANCE_SCALE)
+        matches = {}
+        for name, indices in chosen.items():
+            member = self._working_mask(indices)[asked]
+            votes = member.mean(axis=1)
+            confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
+            index, follows = target.to_all(votes > 0.5)
+            matches[name] = Match(
+                indices=index,
+                points=target.original(self.map_points(indices, target).points),
+                confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
+                method="mask",
+            )
+        target.seconds["associate"] = time.perf_counter() - start
+        return matches
+
+    def _by_points(self, indices: np.ndarray, target: Embedded) -> Match:
+        start = time.perf_counter()
+        mapped = self.map_points(indices, target)
+        target.seconds["map"] = time.perf_counter() - start
+        start = time.perf_counter()
+        nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
+        found, first = np.unique(nearest, return_index=True)
+        trust = mapped.trust * np.exp(-distance / _DISTANCE_SCALE)
+        target.seconds["associate"] = time.perf_counter() - start
+        return Match(
+            indices=target.working[found],
+            points=target.original(mapped.points),
+            confidence=np.clip(trust[first], 0.0, 1.0),
+            method="points",
+        )
+
+    def _working_mask(self, indices: np.ndarray) -> np.ndarray:
+        """Which working points of the reference a region holds, (n,) bool."""
+        reference = self.reference
+        inside = np.zeros(len(reference.cloud.points), bool)
+        inside[indices] = True
+        mask = inside[reference.working]
+        if mask.any():
+            return mask
+        # The region fell between the points that were kept: its nearest ones stand for it.
+        mask[reference._nearest_working()[indices]] = True
+        return mask
+
+    def _describe(self, points: np.ndarray, normals: np.ndarray) -> torch.Tensor:
+        model = self.model
+        parts = []
+        with torch.inference_mode():
+            for start in range(0, len(points), _CHUNK):
+                part = slice(start, start + _CHUNK)
+                parts.append(
+                    model.field.describe(
+                        self.reference.z, model._tensor(points[part]), model._tensor(normals[part])
+                    )
+                )
+        return torch.cat(parts, dim=1)
+
+    def _invert(self, target: Embedded, k: torch.Tensor, normals: np.ndarray) -> Mapped:
+        parts = []
+        with torch.inference_mode():
+            for start in range(0, k.shape[1], _CHUNK):
+                inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
+                own = normals[start : start + _CHUNK]
+                parts.append(
+                    Mapped(
+                        inverse.points[0].cpu().numpy(),
+                        own if inverse.normals is None else inverse.normals[0].cpu().numpy(),
+                        _trust(inverse.existence, inverse.log_error, len(own)),
+                    )
+                )
+        return Mapped(*(np.concatenate(column) for column in zip(*map(_fields, parts), strict=True)))
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Reference points on a target, canonical: points (m, 3), normals (m, 3), trust (m,) in [0, 1]
+    (that the place exists, and how small an error the field expects)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    trust: np.ndarray
+
+
+_DISTANCE_SCALE = 0.1
+_ERROR_SCALE = 0.05
+
+
+def _fields(mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return mapped.points, mapped.normals, mapped.trust
+
+
+def _trust(
+    existence: torch.Tensor | None, log_error: torch.Tensor | None, count: int
+) -> np.ndarray:
+    trust = torch.ones(count)
+    if existence is not None:
+        trust = trust * existence[0].sigmoid().cpu()
+    if log_error is not None:
+        trust = trust * torch.exp(-log_error[0].exp().cpu() / _ERROR_SCALE)
+    return trust.numpy()
+
+
+def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the points that the encoder sees: an even subset of `count`, which always holds
+    the extreme points of each axis, so that the embedding knows the bounding box exactly."""
+    chosen = thin(points, count, np.random.default_rng(0))
+    extremes = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
+    return np.union1d(chosen, extremes)

@@ -1,0 +1,68 @@
+"""What a user may call a region of a reference, brought to one form: indices of its points."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from nrdf.cloud import PointCloud
+from nrdf.errors import RegionError
+
+ON_REFERENCE = 0.02
+"""Largest distance of a region's point from the reference, as a share of its longest side."""
+
+
+def region_indices(region: ArrayLike | PointCloud, reference: PointCloud) -> np.ndarray:
+    """Indices (m,) into `reference.points` of a region, in the region's own order.
+
+    region: a boolean mask (n,), integer indices (m,), or points (m, 3) in the reference's frame
+    and unit (array or PointCloud), each of which stands for the nearest reference point.
+
+    Raises RegionError for a region that is empty, has the wrong shape, indices out of range, or
+    points farther from the reference than 2 % of its longest side.
+    """
+    values = region.points if isinstance(region, PointCloud) else np.asarray(region)
+    count = len(reference.points)
+    if values.size == 0:
+        raise RegionError("the region is empty; it needs at least one point of the reference")
+    if values.dtype == bool:
+        if values.shape != (count,):
+            raise RegionError(
+                f"a region's mask must have one value for each of the reference's {count} points, "
+                f"not shape {values.shape}"
+            )
+        indices = np.flatnonzero(values)
+        if len(indices) == 0:
+            raise RegionError("the region's mask is False everywhere; mark at least one point")
+        return indices
+    if np.issubdtype(values.dtype, np.integer) and values.ndim == 1:
+        if values.min() < 0 or values.max() >= count:
+            raise RegionError(
+                f"a region's indices must lie in 0 to {count - 1}, "
+                f"not {values.min()} to {values.max()}"
+            )
+        return values.astype(np.int64)
+    if values.ndim == 2 and values.shape[1] == 3 and np.issubdtype(values.dtype, np.number):
+        return _nearest_indices(values.astype(np.float64), reference.points)
+    raise RegionError(
+        "a region is a boolean mask (n,), integer indices (m,) or points (m, 3) on the reference, "
+        f"not an array of {values.dtype} of shape {values.shape}"
+    )
+
+
+def _nearest_indices(points: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    if not np.isfinite(points).all():
+        raise RegionError("the region has coordinates that are not finite; remove those points")
+    distance, indices = cKDTree(reference).query(points)
+    extent = float(np.ptp(reference, axis=0).max())
+    worst = float(distance.max())
+    if worst > ON_REFERENCE * extent:
+        off = int((distance > ON_REFERENCE * extent).sum())
+        raise RegionError(
+            f"{off} of the region's {len(points)} points are not on the reference: the farthest is "
+            f"{worst:.4g} away from it ({100 * worst / extent:.1f} % of its longest side, "
+            f"{extent:.4g}); at most {100 * ON_REFERENCE:.0f} % is allowed. Are both in the same "
+            "frame and unit?"
+        )
+    return indices
