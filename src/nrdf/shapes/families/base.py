@@ -230,7 +230,8 @@ class Part:
         self, face: Faces, u: Array, v: Array, wall: NDArray[np.intp]
     ) -> tuple[Array, Array, Array]:
         """Section coordinates and s, (n,) each."""
-        rho, s = np.where(face == SIDE, 1.0, v), np.where(face == SIDE, v, face == CAP_STOP)
+        along = v if self.station is None else self.station(u, v)
+        rho, s = np.where(face == SIDE, 1.0, v), np.where(face == SIDE, along, face == CAP_STOP)
         if not len(wall):
             return *self.section.disc(u, rho, s), s
         p, q = np.empty_like(u), np.empty_like(u)
