@@ -6,12 +6,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import CloudError
 
 _LARGEST_GRID = 1 << 25  # cells of a dense voxel grid, 128 MiB of indices
+_CHUNK = 1 << 18  # points handled at a time
 
 
 def bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -57,13 +60,17 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     if total <= count:
         return np.arange(total)
     lowest, highest = bounding_box(points)
-    side = max(float((highest - lowest).max()), np.finfo(np.float64).tiny)
+    side = float((highest - lowest).max())
+    if side == 0.0:
+        return np.sort(rng.choice(total, count, replace=False))
     kept = np.arange(total)
     if total > 8 * count:
         # A first, fine grid makes the bisection independent of the number of points.
-        fine = _one_per_cell(points, lowest, side / (6.0 * np.sqrt(count)))
-        if len(fine) >= 2 * count:
-            kept = fine
+        fine = _one_per_cell(points, lowest, side / min(6.0 * np.sqrt(count), 320.0))
+        few = len(fine) < 2 * count
+        kept = np.unique(rng.integers(0, total, 8 * count)) if few else fine
+        if len(kept) > 64 * count:
+            kept = kept[np.unique(rng.integers(0, len(kept), 64 * count))]
     kept = rng.permutation(kept)
     candidates = points[kept]
     small, large = side * 1e-4, side
@@ -86,36 +93,50 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
 
 def _one_per_cell(points: np.ndarray, lowest: np.ndarray, cell: float) -> np.ndarray:
     """Index of one point in each occupied cell of a grid, in the order of the cells."""
-    shape = np.zeros(3, dtype=np.int64)
-    key = np.zeros(len(points), dtype=np.int64)
-    for axis in range(3):
-        column = ((points[:, axis] - lowest[axis]) / cell).astype(np.int64)
-        shape[axis] = int(column.max()) + 1
-        key *= shape[axis]
-        key += column
-    if int(np.prod(shape)) <= _LARGEST_GRID:
-        first = np.full(int(np.prod(shape)), -1, dtype=np.int32)
-        first[key] = np.arange(len(points), dtype=np.int32)
-        return first[first >= 0].astype(np.int64)
-    return np.unique(key, return_index=True)[1]
+    shape = ((points.max(axis=0) - lowest) / cell).astype(np.int64) + 1
+    strides = np.array([shape[1] * shape[2], shape[2], 1], dtype=np.float64)
+    dense = float(np.prod(shape.astype(float))) <= _LARGEST_GRID
+    first = np.full(int(np.prod(shape)) if dense else 0, -1, dtype=np.int32)
+    keys = np.empty(0 if dense else len(points), dtype=np.int64)
+    for start in range(0, len(points), _CHUNK):
+        chunk = points[start : start + _CHUNK]
+        key = (np.floor((chunk - lowest) / cell) @ strides).astype(np.int64)
+        if dense:
+            first[key] = np.arange(start, start + len(chunk), dtype=np.int32)
+        else:
+            keys[start : start + len(chunk)] = key
+    return first[first >= 0].astype(np.int64) if dense else np.unique(keys, return_index=True)[1]
 
 
-def estimate_normals(points: np.ndarray, neighbours: int = 12, directions: int = 60) -> np.ndarray:
+def estimate_normals(points: np.ndarray, neighbours: int = 16, directions: int = 100) -> np.ndarray:
     """Outward unit normals (n, 3) of a full cloud `points` (n, 3), any unit.
 
-    The line of each normal comes from a principal component analysis of the nearest `neighbours`;
-    its sign from visibility: orthographic depth images of the cloud are taken from `directions`
-    evenly spread viewpoints, and the normal points to where the point is seen from. Raises
-    CloudError with fewer than 4 points.
+    The line of each normal comes from a principal component analysis of `neighbours` nearest
+    points; its sign from visibility in orthographic depth images taken from `directions` evenly
+    spread viewpoints, which stand in for hidden-point removal (Katz et al., 2007). The mean
+    direction that a point is seen from keeps the two sides of a thin sheet apart in the
+    neighbourhoods, and neighbours on one sheet vote on the sign together. Raises CloudError with
+    fewer than 4 points.
     """
-    points = np.asarray(points, dtype=np.float64)
     if len(points) < 4:
         raise CloudError(f"normals need at least 4 points, this cloud has {len(points)}")
+    points = ((points - points.mean(axis=0)) / canonical_transform(points)[1]).astype(np.float32)
     neighbours = min(neighbours, len(points))
-    distance, index = cKDTree(points).query(points, neighbours, workers=-1)
-    normals = _principal_normals(points, index)
-    spacing = float(np.median(distance[:, -1])) * np.sqrt(np.pi / neighbours)
-    return _orient(normals, points, fibonacci_directions(directions), spacing)[0]
+    distance, index = _nearest(points, neighbours)
+    spacing = _spacing(distance)
+    closeness = np.exp(-((distance / (distance[:, neighbours // 2, None] + 1e-12)) ** 2)) + 1e-6
+
+    toward = _seen_from(points, None, fibonacci_directions(directions * 3 // 5), spacing, 0.7)
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True) + 1e-6
+    same_side = np.maximum(np.einsum("nka,na->nk", toward[index], toward), 0.01) ** 2
+    normals = _principal_normals(points, index, closeness * same_side)
+
+    toward = _seen_from(points, normals, fibonacci_directions(directions), spacing, 0.4)
+    trust = np.linalg.norm(toward, axis=1)
+    trust = np.minimum(trust / (0.2 * directions), 1.0) / (trust + 1e-6)
+    sign = np.einsum("na,na->n", toward, normals) * trust
+    sign = _consensus(sign, points, normals, index, closeness, 0.25 * spacing)
+    return np.where(sign < 0.0, -1.0, 1.0)[:, None] * normals.astype(np.float64)
 
 
 def outward_by_visibility(
@@ -126,53 +147,112 @@ def outward_by_visibility(
     Returns the normals (n, 3), and for each point the number (n,) of the `directions` that see it
     from that side; points inside a hull are seen by few or none.
     """
-    distance = cKDTree(points).query(points, min(9, len(points)), workers=-1)[0][:, -1]
-    spacing = float(np.median(distance)) * np.sqrt(np.pi / 9.0)
-    return _orient(normals, points, fibonacci_directions(directions), spacing)
+    points32 = points.astype(np.float32)
+    normals32 = normals.astype(np.float32)
+    spacing = _spacing(_nearest(points32, min(9, len(points)))[0])
+    vote = np.zeros(len(points))
+    front, back = np.zeros((2, len(points)), dtype=np.int64)
+    views = fibonacci_directions(directions).astype(np.float32)
+    for view, seen in _depth_images(points32, normals32, views, spacing, 0.4):
+        facing = normals32 @ view
+        vote += seen * facing
+        front += seen & (facing > 0.0)
+        back += seen & (facing < 0.0)
+    flip = vote < 0.0
+    return np.where(flip[:, None], -normals, normals), np.where(flip, back, front)
 
 
-def _orient(
-    normals: np.ndarray, points: np.ndarray, views: np.ndarray, spacing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    seen = visible_from(points, normals, views, spacing)
-    facing = views @ normals.T
-    flip = np.einsum("dn,dn->n", seen, facing) < 0.0
-    count = (seen & ((facing > 0.0) != flip)).sum(axis=0)
-    return np.where(flip[:, None], -normals, normals), count
+def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distances and indices, each (n, count), of the nearest points, the point itself first."""
+    distance, index = cKDTree(points).query(points, count, workers=-1)
+    return distance.astype(np.float32), index
 
 
-def _principal_normals(points: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """Unit normals (n, 3), sign arbitrary, of the neighbourhoods `index` (n, k)."""
+def _spacing(distance: np.ndarray) -> float:
+    """Typical distance between points: the side of the square that each has to itself."""
+    column = min(8, distance.shape[1] - 1)
+    return float(np.median(distance[:, column])) * float(np.sqrt(np.pi / (column + 1)))
+
+
+def _principal_normals(points: np.ndarray, index: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Unit normals (n, 3), sign arbitrary, of neighbourhoods `index` with `weight` (n, k)."""
+    weight = weight / weight.sum(axis=1, keepdims=True)
     offset = points[index]
-    offset -= offset.mean(axis=1, keepdims=True)
-    return np.linalg.eigh(offset.transpose(0, 2, 1) @ offset)[1][:, :, 0]
+    offset -= np.einsum("nk,nka->na", weight, offset)[:, None]
+    scatter = (offset * weight[:, :, None]).transpose(0, 2, 1) @ offset
+    return np.linalg.eigh(scatter)[1][:, :, 0]
 
 
-def visible_from(
-    points: np.ndarray, normals: np.ndarray, views: np.ndarray, spacing: float
+def _consensus(
+    sign: np.ndarray,
+    points: np.ndarray,
+    normals: np.ndarray,
+    index: np.ndarray,
+    closeness: np.ndarray,
+    thickness: float,
 ) -> np.ndarray:
-    """Which of `points` (n, 3) each of the directions `views` (d, 3) sees: (d, n) bool.
+    """Let the signs (n,) of points on one sheet, at most `thickness` apart, vote together."""
+    offset = points[index] - points[:, None]
+    agreement = np.einsum("nka,na->nk", normals[index], normals)
+    apart = np.maximum(
+        np.abs(np.einsum("nka,na->nk", offset, normals)),
+        np.abs(np.einsum("nka,nka->nk", offset, normals[index])),
+    )
+    weight = closeness * np.exp(-((apart / thickness) ** 2)) * agreement * np.abs(agreement)
+    weight[:, 0] = 0.0
+    weight /= np.abs(weight).sum(axis=1, keepdims=True) + 0.2
+    voted = sign
+    for _ in range(3):
+        voted = sign + np.einsum("nk,nk->n", weight, np.tanh(3.0 * voted)[index])
+    return voted
 
-    Orthographic depth images with cells of twice the point `spacing`. Depths are compared on the
-    points' tangent planes (`normals` (n, 3), any sign) at the middle of the cell, so that a
-    surface seen at a slant does not hide itself.
+
+def _seen_from(
+    points: np.ndarray,
+    normals: np.ndarray | None,
+    views: np.ndarray,
+    spacing: float,
+    tolerance: float,
+) -> np.ndarray:
+    """Sum (n, 3) of the directions `views` (d, 3) that each point is seen from."""
+    toward = np.zeros_like(points)
+    for view, seen in _depth_images(points, normals, views, spacing, tolerance):
+        toward += seen[:, None] * view
+    return toward
+
+
+def _depth_images(
+    points: np.ndarray,
+    normals: np.ndarray | None,
+    views: np.ndarray,
+    spacing: float,
+    tolerance: float,
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Each of `views` (d, 3) with the mask (n,) of the points that it sees.
+
+    Orthographic depth images with cells of twice the point `spacing`; a point is seen if no other
+    of its cell is nearer by `tolerance` spacings. With `normals` (n, 3), any sign, depths are
+    compared on the points' tangent planes at the middle of the cell, so that a surface seen at a
+    slant does not hide itself.
     """
-    cell, tolerance, steepest = 2.0 * spacing, 0.7 * spacing, 3.0
+    cell, steepest = 2.0 * spacing, 3.0
+    views = views.astype(np.float32)
     helper = np.where(np.abs(views[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     right = np.cross(views, helper)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
-    up = np.cross(views, right)
-    seen = np.empty((len(views), len(points)), dtype=bool)
-    for i, view in enumerate(views):
-        x, y = points @ right[i] / cell, points @ up[i] / cell
-        x, y = x - x.min(), y - y.min()
+    frames = np.stack([right / cell, np.cross(views, right) / cell, views], axis=1)
+    turned = np.ascontiguousarray(points.T)
+    lines = None if normals is None else np.ascontiguousarray(normals.T)
+    for view, frame in zip(views, frames.astype(np.float32), strict=True):
+        x, y, depth = frame @ turned
+        x -= x.min()
+        y -= y.min()
         column, row = x.astype(np.int64), y.astype(np.int64)
-        toward = normals @ view
-        toward = np.where(toward < 0, -1.0, 1.0) / np.maximum(np.abs(toward), 1.0 / steepest)
-        slope_x, slope_y = -(normals @ right[i]) * toward, -(normals @ up[i]) * toward
-        depth = points @ view + cell * (slope_x * (column + 0.5 - x) + slope_y * (row + 0.5 - y))
+        if lines is not None:
+            slope_x, slope_y, toward = frame @ lines
+            steep = np.copysign(np.maximum(np.abs(toward), 1.0 / steepest), toward) / cell**2
+            depth += ((x - column - 0.5) * slope_x + (y - row - 0.5) * slope_y) / steep
         pixel = row * (int(column.max()) + 1) + column
-        nearest = np.full(int(pixel.max()) + 1, -np.inf)
+        nearest = np.full(int(pixel.max()) + 1, -np.inf, dtype=np.float32)
         np.maximum.at(nearest, pixel, depth)
-        seen[i] = depth >= nearest[pixel] - tolerance
-    return seen
+        yield view, depth >= nearest[pixel] - np.float32(tolerance * spacing)
