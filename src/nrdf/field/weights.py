@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
-from nrdf.errors import ConfigError, ModelError, OutputError
+from nrdf.errors import ConfigError, ModelError
 from nrdf.field import build_field
 from nrdf.field.base import Field
+from nrdf.ply import write_atomically
 
 FORMAT = "nrdf-weights-1"
 
@@ -27,7 +27,6 @@ def save_weights(path: str | Path, field: Field, metadata: Mapping[str, Any]) ->
     `metadata` needs a `category` and may hold anything that JSON can; preset and sizes are added.
     Raises OutputError when the file cannot be written.
     """
-    path = Path(path)
     if "category" not in metadata:
         raise ValueError("metadata needs a category")
     tensors = {name: _half(value) for name, value in field.state_dict().items()}
@@ -39,15 +38,7 @@ def save_weights(path: str | Path, field: Field, metadata: Mapping[str, Any]) ->
     }
     text = {key: json.dumps(value, sort_keys=True) for key, value in content.items()}
     text["sha256"] = _digest(tensors, text)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save_file(tensors, temporary, metadata=text)
-        os.replace(temporary, path)
-    except (OSError, SafetensorError) as error:
-        raise OutputError(f"cannot write weights to {path}: {error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_atomically(Path(path), [save(tensors, metadata=text)])
 
 
 def load_weights(

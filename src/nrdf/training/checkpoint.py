@@ -15,6 +15,7 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
 from nrdf.errors import ModelError, OutputError
+from nrdf.ply import write_atomically
 
 FOLDER = "checkpoints"
 IDENTITY = "run.json"
@@ -135,19 +136,8 @@ def open_run(run: Path, identity: dict[str, Any], overwrite: bool = False) -> bo
 
 def write_identity(run: Path, identity: dict[str, Any], provenance: dict[str, Any]) -> None:
     """Save what the run is, and the versions and commit that made it."""
-    write_text(run / IDENTITY, json.dumps({"identity": identity, **provenance}, indent=1))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a small file so that it is never half there (OutputError when it cannot be)."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    text = json.dumps({"identity": identity, **provenance}, indent=1)
+    write_atomically(run / IDENTITY, [text.encode()])
 
 
 def _differences(known: Any, wanted: Any, where: str = "") -> list[str]:

@@ -143,7 +143,9 @@ class Bank:
 
     def plain(self) -> dict[str, Bank]:
         """By pool, the same shapes without deformation or noise; pools of one are left out."""
-        config = self.config.model_copy(update={"augment": AugmentConfig(), "rolls": 1})
+        config = self.config.model_copy(
+            update={"augment": AugmentConfig(), "rolls": 1, "correspondences": 256}
+        )
         found = {}
         for pattern, _, members in self.pools:
             if len(members) > 1:
