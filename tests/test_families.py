@@ -13,7 +13,6 @@ from nrdf.shapes.families.base import (
     CAP_START,
     CAP_STOP,
     SIDE,
-    SKIN,
     WALL,
     Affine,
     Part,
@@ -24,7 +23,7 @@ from nrdf.shapes.families.base import (
 from nrdf.shapes.families.sections import Airfoil, Superellipse, linear, rounded, smooth
 
 SEEDS = range(12)
-EPS = 3e-4
+EPS = 3e-5  # canonical; small, because trailing edges are thin
 
 
 @pytest.fixture(scope="module", params=FAMILY_NAMES)
@@ -35,6 +34,11 @@ def family(request: pytest.FixtureRequest) -> Family:
 @pytest.fixture(scope="module")
 def members(family: Family) -> list[Member]:
     return [family.member(seed) for seed in SEEDS]
+
+
+@pytest.fixture(scope="module")
+def coordinates(family: Family) -> SurfaceCoordinates:
+    return family.canonical_coordinates(3000, np.random.default_rng(0), members=25)
 
 
 def flips(member: Member, points: np.ndarray, normals: np.ndarray) -> float:
@@ -57,18 +61,10 @@ def test_a_seed_fixes_the_member(family: Family) -> None:
     np.testing.assert_array_equal(one.coordinates.slot, two.coordinates.slot)
 
 
-def test_a_generator_fixes_the_canonical_list(family: Family) -> None:
-    one, two = (
-        family.canonical_coordinates(300, np.random.default_rng(5), members=4) for _ in range(2)
-    )
-    np.testing.assert_array_equal(one.u, two.u)
-    np.testing.assert_array_equal(one.slot, two.slot)
-
-
 def test_seeds_give_distinct_members(family: Family) -> None:
     queries = np.random.default_rng(0).uniform(-0.5, 0.5, (1500, 3))
-    bits = {family.member(seed).occupancy(queries).tobytes() for seed in range(60)}
-    assert len(bits) == 60
+    bits = {family.member(seed).occupancy(queries).tobytes() for seed in range(30)}
+    assert len(bits) == 30
 
 
 def test_members_are_canonical(members: list[Member]) -> None:
@@ -133,7 +129,7 @@ def test_locating_on_another_member_lands_on_its_surface(members: list[Member]) 
         points, normals = located.points[located.exists], located.normals[located.exists]
         shares.append(located.exists.mean())
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
-        assert flips(other, points, normals) >= 0.99
+        assert flips(other, points, normals) >= 0.995
         there_and_back = one.locate(sample.coordinates[located.exists])
         np.testing.assert_allclose(there_and_back.points, sample.points[located.exists], atol=1e-12)
     assert np.mean(shares) > 0.4
@@ -163,20 +159,25 @@ def test_a_slot_that_a_member_lacks_does_not_exist(family: Family) -> None:
         assert not located.points.any()
 
 
-def test_the_canonical_list_covers_every_slot_that_occurs(family: Family) -> None:
-    rng = np.random.default_rng(0)
-    coordinates = family.canonical_coordinates(1500, rng, members=60)
-    assert len(coordinates) == 1500
-    occurring = {p.slot for seed in range(15) for p in family.member(seed).parts}
+def test_the_canonical_list_covers_every_slot_that_occurs(
+    family: Family, members: list[Member], coordinates: SurfaceCoordinates
+) -> None:
+    assert len(coordinates) == 3000
     listed = {family.slots[i] for i in np.unique(coordinates.slot)}
-    visible = {s for s in occurring if not s.startswith("caster")}
-    assert len(visible - listed) <= 0.1 * len(visible)
-    exists = [family.member(seed).locate(coordinates).exists.mean() for seed in SEEDS]
-    assert 0.15 < np.mean(exists) < 1
+    assert {part.slot for member in members for part in member.parts} <= listed
+    shares = [member.locate(coordinates).exists.mean() for member in members]
+    assert 0.15 < np.mean(shares) < 1
 
 
-def test_regions_are_named_and_found(family: Family) -> None:
-    coordinates = family.canonical_coordinates(3000, np.random.default_rng(0), members=40)
+def test_a_generator_fixes_the_canonical_list(
+    family: Family, coordinates: SurfaceCoordinates
+) -> None:
+    again = family.canonical_coordinates(3000, np.random.default_rng(0), members=25)
+    np.testing.assert_array_equal(again.u, coordinates.u)
+    np.testing.assert_array_equal(again.slot, coordinates.slot)
+
+
+def test_regions_are_named_and_found(family: Family, coordinates: SurfaceCoordinates) -> None:
     names = family.region_of(coordinates)
     assert set(np.unique(names)) - {""} <= set(family.region_names)
     for name in family.region_names:
@@ -269,7 +270,7 @@ def test_a_warped_and_mirrored_part_keeps_its_skin(axis: int, section: Superelli
     assert set(np.unique(sample.coordinates.face)) == {SIDE, CAP_START, CAP_STOP, WALL} or (
         section.half_width(np.zeros(1)) == 0
     )
-    assert flips(member, sample.points, sample.normals) >= 0.99
+    assert flips(member, sample.points, sample.normals) >= 0.995
 
 
 def test_samples_are_even_by_area() -> None:
@@ -288,4 +289,3 @@ def test_a_part_in_the_wrong_direction_or_twice_in_a_slot_is_refused() -> None:
     part = Part("a", 0, 0.0, 1.0, Superellipse(1.0, 1.0))
     with pytest.raises(ValueError, match="distinct slots"):
         Member(("a",), [part, part])
-    assert SKIN < EPS

@@ -166,6 +166,7 @@ class ChairFamily(Family):
         *fu.APRON_SLOTS,
         *fu.RUNNER_SLOTS,
         *fu.PEDESTAL_SLOTS,
+        *fu.CASTER_SLOTS,
         *_ARM_SLOTS,
         *_WING_SLOTS,
     )

@@ -17,12 +17,8 @@ STRETCHER_SLOTS = tuple(f"stretcher-{where}" for where in (*SIDES, *ENDS, "middl
 APRON_SLOTS = tuple(f"apron-{where}" for where in (*SIDES, *ENDS))
 RUNNER_SLOTS = tuple(f"runner-{where}" for where in (*SIDES, *ENDS))
 STAR = 6
-PEDESTAL_SLOTS = (
-    "column",
-    "base",
-    *(f"star-{i}" for i in range(STAR)),
-    *(f"caster-{i}" for i in range(STAR)),
-)
+PEDESTAL_SLOTS = ("column", "base", *(f"star-{i}" for i in range(STAR)))
+CASTER_SLOTS = tuple(f"caster-{i}" for i in range(STAR))
 
 
 def chance(rng: np.random.Generator, probability: float) -> bool:

@@ -132,30 +132,36 @@ class Member:
 
     def sample_surface(self, count: int, rng: np.random.Generator) -> SurfaceSample:
         """`count` points spread evenly by area over the visible skin."""
-        cells, area = self._cells
-        got: list[SurfaceSample] = []
-        missing = count
-        while missing > 0:
-            draw = int(1.4 * missing) + 32
-            cell = cells[np.searchsorted(area, rng.random(draw) * area[-1], side="right")]
-            mix_u, mix_v = rng.random((2, draw))
-            coordinates = SurfaceCoordinates(
-                cell[:, 0].astype(np.int32),
-                cell[:, 1].astype(np.int32),
-                cell[:, 2] + mix_u * (cell[:, 3] - cell[:, 2]),
-                _between(
-                    cell[:, 4], cell[:, 5], mix_v, disc=np.isin(cell[:, 1], (CAP_START, CAP_STOP))
-                ),
-            )
-            here = self.locate(coordinates)
-            keep = np.flatnonzero(here.exists)[:missing]
-            got.append(SurfaceSample(here.points[keep], here.normals[keep], coordinates[keep]))
-            missing -= len(keep)
+        got = [self.draw(int(1.4 * count) + 32, rng)]
+        while (missing := count - sum(len(g.coordinates) for g in got)) > 0:
+            got.append(self.draw(int(1.4 * missing) + 32, rng))
         return SurfaceSample(
-            np.concatenate([g.points for g in got]),
-            np.concatenate([g.normals for g in got]),
-            SurfaceCoordinates.concatenate([g.coordinates for g in got]),
+            np.concatenate([g.points for g in got])[:count],
+            np.concatenate([g.normals for g in got])[:count],
+            SurfaceCoordinates.concatenate([g.coordinates for g in got])[:count],
         )
+
+    def draw(self, count: int, rng: np.random.Generator, slot: int | None = None) -> SurfaceSample:
+        """The visible ones of `count` random surface points; of one slot (index) if given."""
+        cells, area = self._cells
+        first, last = 0.0, area[-1]
+        if slot is not None:
+            mine = np.flatnonzero(cells[:, 0] == slot)
+            if not len(mine):
+                raise ValueError(f"this member has no slot '{self.slots[slot]}'")
+            first, last = area[mine[0] - 1] if mine[0] else 0.0, area[mine[-1]]
+        where = np.searchsorted(area, first + rng.random(count) * (last - first), side="right")
+        cell = cells[np.minimum(where, len(cells) - 1)]
+        mix_u, mix_v = rng.random((2, count))
+        coordinates = SurfaceCoordinates(
+            cell[:, 0].astype(np.int32),
+            cell[:, 1].astype(np.int32),
+            cell[:, 2] + mix_u * (cell[:, 3] - cell[:, 2]),
+            _between(cell[:, 4], cell[:, 5], mix_v, np.isin(cell[:, 1], (CAP_START, CAP_STOP))),
+        )
+        here = self.locate(coordinates)
+        keep = here.exists
+        return SurfaceSample(here.points[keep], here.normals[keep], coordinates[keep])
 
 
 def _between(low: Array, high: Array, mix: Array, disc: NDArray[np.bool_]) -> Array:
@@ -222,30 +228,44 @@ class Family(ABC):
 
     def member(self, seed: int) -> Member:
         """The member that belongs to a seed (any non-negative integer)."""
-        rng = np.random.default_rng([zlib.crc32(self.name.encode()), seed])
-        return Member(self.slots, self.build(rng))
+        return Member(self.slots, self._parts(seed))
+
+    def _parts(self, seed: int) -> list[Part]:
+        return self.build(np.random.default_rng([zlib.crc32(self.name.encode()), seed]))
 
     def canonical_coordinates(
         self, count: int, rng: np.random.Generator, members: int = 200
     ) -> SurfaceCoordinates:
         """A list of surface coordinates (count,) over all slots that members have.
 
-        Pooled evenly by area from `members` random members, so big surfaces get most; each slot
-        that occurred gets at least its share of an eighth of the list. Shared by a whole data
-        set, `member.locate(list)` gives one correspondence group.
+        Pooled evenly by area from `members` random members (and more, for rare slots), so big
+        surfaces get most; every slot gets at least its share of an eighth of the list. Shared
+        by a whole data set, `member.locate(list)` gives one correspondence group.
         """
-        seeds = rng.integers(2**32, size=members)
-        per_member = max(2 * count // members, 64)
-        pool = SurfaceCoordinates.concatenate(
-            [self.member(int(s)).sample_surface(per_member, rng).coordinates for s in seeds]
-        )
-        order = rng.permutation(len(pool))
-        slots = pool.slot[order]
-        present = np.unique(slots)
-        least = count // (8 * len(present))
-        first = [order[np.flatnonzero(slots == s)[:least]] for s in present]
-        chosen = np.concatenate([*first, order[~np.isin(order, np.concatenate(first))]])[:count]
-        return pool[np.sort(chosen)]
+        having: dict[int, list[Member]] = {}
+        pool = []
+        for index, seed in enumerate(rng.integers(2**32, size=members + 1000)):
+            if len(having) == len(self.slots) and index >= members:
+                break
+            parts = self._parts(int(seed))
+            slots = {self.slot(part.slot) for part in parts}
+            if index >= members and slots <= set(having):
+                continue
+            member = Member(self.slots, parts)
+            pool.append(member.sample_surface(max(2 * count // members, 16), rng).coordinates)
+            for slot in slots:
+                having.setdefault(slot, []).append(member)
+        least = max(count // (8 * len(having)), 1)
+        first = []
+        for slot, donors in sorted(having.items()):
+            picked = rng.choice(len(donors), size=min(len(donors), 4), replace=False)
+            drawn = [donors[i].draw(least + 16, rng, slot).coordinates for i in picked]
+            mine = SurfaceCoordinates.concatenate(drawn)
+            first.append(mine[rng.permutation(len(mine))[:least]])
+        reserved = SurfaceCoordinates.concatenate(first)
+        rest = SurfaceCoordinates.concatenate(pool)
+        rest = rest[rng.permutation(len(rest))[: max(count - len(reserved), 0)]]
+        return SurfaceCoordinates.concatenate([reserved, rest])[:count]
 
     def region(self, name: str, coordinates: SurfaceCoordinates) -> NDArray[np.bool_]:
         """Mask (n,) of the coordinates in one region; ValueError names the regions there are."""

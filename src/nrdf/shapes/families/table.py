@@ -135,7 +135,7 @@ def _legged(
         y = bottom - half + 0.004
         heights = {"left": y, "front": y, "rear": y}
         parts += stand.rails("apron", heights, (half, style.size * rng.uniform(0.3, 0.95)), 40.0)
-    extra = pick(rng, {"none": 4, "stretchers": 2.5, "shelf": 1.8, "drawers": 0.8})
+    extra = pick(rng, {"none": 4, "stretchers": 2.5, "shelf": 1.8, "drawers": 1.5})
     if extra == "stretchers":
         parts += fu.random_stretchers(rng, stand, floor, bottom)
     elif extra == "shelf":
@@ -145,7 +145,7 @@ def _legged(
         outline = Superellipse(half_z * rng.uniform(0.95, 1.02), half_x * 1.02, 20.0)
         centre = 0.0, float((front[0] + rear[0]) / 2)
         parts.append(Part("shelf", 1, y - thin, y + thin, outline, centre=centre))
-    elif extra == "drawers" and inset > 0.8 and kind != "sled":
+    elif extra == "drawers" and inset > 0.7 and kind != "sled":
         parts += _drawers(rng, bottom, top["front"], style)
     return parts
 
