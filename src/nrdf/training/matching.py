@@ -8,6 +8,8 @@ from torch import Tensor
 
 PAIRS_AT_ONCE = 1 << 24
 """Distances held in memory at a time (64 MiB of float32)."""
+REST_BLOCK = 512
+"""How many of those that an auction leaves over are assigned exactly at a time."""
 
 
 def distances(a: Tensor, b: Tensor) -> Tensor:
@@ -100,9 +102,9 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
 
     Auction (Bertsekas 1988), all batch elements at once: every bidder without an object bids for
     its best one, by what it is better than its second best plus `eps`; the highest bid takes the
-    object. The few left after `iterations` rounds share the objects left, at least cost. The mean
-    distance is within `eps` of the optimum once the auction has ended (some 1000 rounds for 1000
-    unrelated points); after 50 it is about a tenth too large for unrelated clouds, the worst case.
+    object. Those left after `iterations` rounds share the objects left (`_assign_rest`). The mean
+    distance is within `eps` of the optimum once the auction has ended, which takes some 1000 rounds
+    for 1000 unrelated points; after 50 it is 1 to 20 % too large.
     """
     count, n, _ = a.shape
     if b.shape != a.shape:
@@ -110,7 +112,9 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
     if n == 1:
         return torch.zeros(count, 1, dtype=torch.long, device=a.device)
     cost = distances(a, b).reshape(count * n, n)
-    price = torch.zeros(count * n, device=a.device)
+    # Any prices may start a symmetric auction. These keep a cloud that is still shrunk to a point
+    # from bidding for one object at a time.
+    price = -cost.view(count, n, n).mean(dim=1).flatten()
     owner = torch.full((count * n,), -1, dtype=torch.long, device=a.device)
     chosen = torch.full((count * n,), -1, dtype=torch.long, device=a.device)
     for _ in range(iterations):
@@ -131,7 +135,8 @@ def assign(a: Tensor, b: Tensor, eps: float = 0.005, iterations: int = 50) -> Te
         price = torch.where(sold, highest, price)
         chosen[winner[sold]] = sold.nonzero().squeeze(1)
     chosen = torch.where(chosen >= 0, chosen % n, chosen).view(count, n)
-    return _assign_rest(cost.view(count, n, n), chosen)
+    _assign_rest(a, b, chosen)
+    return chosen
 
 
 def _best_objects(
@@ -148,19 +153,28 @@ def _best_objects(
     return wanted, margin
 
 
-def _assign_rest(cost: Tensor, chosen: Tensor) -> Tensor:
-    """Fill the -1 entries of chosen (b, n) with the objects left, at least total cost."""
-    if bool((chosen >= 0).all()):
-        return chosen
+def _assign_rest(a: Tensor, b: Tensor, chosen: Tensor) -> None:
+    """Fill the -1 entries of chosen (b, n) with the objects left.
+
+    Bidders and objects are sorted along the objects' longest axis and matched at least cost in
+    blocks: the exact assignment of all of them takes seconds when nearly all are left.
+    """
     n = chosen.shape[1]
-    for element in range(chosen.shape[0]):
+    for element in range(len(chosen)):
         bidder = (chosen[element] < 0).nonzero().squeeze(1)
         if len(bidder) == 0:
             continue
         free = torch.ones(n, dtype=torch.bool, device=chosen.device)
         free[chosen[element][chosen[element] >= 0]] = False
         left = free.nonzero().squeeze(1)
-        rows, columns = linear_sum_assignment(cost[element][bidder][:, left].cpu().numpy())
-        order = torch.as_tensor(columns, device=chosen.device)
-        chosen[element, bidder[torch.as_tensor(rows, device=chosen.device)]] = left[order]
-    return chosen
+        extent = b[element, left].max(dim=0).values - b[element, left].min(dim=0).values
+        axis = int(extent.argmax())
+        bidder = bidder[a[element, bidder, axis].argsort(stable=True)]
+        left = left[b[element, left, axis].argsort(stable=True)]
+        for start in range(0, len(bidder), REST_BLOCK):
+            ours, theirs = bidder[start : start + REST_BLOCK], left[start : start + REST_BLOCK]
+            cost = distances(a[None, element, ours], b[None, element, theirs])[0]
+            # Changes nothing about the optimum, and makes finding it up to 20 times faster.
+            cost = cost - cost.mean(dim=0)
+            order = torch.as_tensor(linear_sum_assignment(cost.cpu().numpy())[1])
+            chosen[element, ours] = theirs[order.to(chosen.device)]
