@@ -1,0 +1,132 @@
+"""The command line: one verb per command, errors without tracebacks, an exit code for scripts."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import nrdf
+from nrdf.errors import NrdfError
+
+USAGE = """usage: nrdf VERB ... [-v]
+
+Teach a region once, on one object, and find it on every object of that kind.
+"""
+NOTES = """
+Every verb explains itself, with an example:  nrdf VERB --help
+-v shows debug messages; nrdf --version the version.
+Ends with 0, with 2 for bad input (the message says what to do), with 130 after Ctrl-C."""
+
+
+def verbs() -> dict[str, Callable[..., Any]]:
+    """Name to function; their modules import nothing heavy."""
+    from nrdf.commands.evaluate import bench, evaluate
+    from nrdf.commands.information import info, zoo
+    from nrdf.commands.retrieve import retrieve
+    from nrdf.commands.shapes import correspond, synth
+    from nrdf.commands.show import demo
+    from nrdf.commands.train import train
+
+    return {
+        "retrieve": retrieve,
+        "demo": demo,
+        "info": info,
+        "synth": synth,
+        "correspond": correspond,
+        "train": train,
+        "zoo": zoo,
+        "eval": evaluate,
+        "bench": bench,
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command and exit with its code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    verbose = any(word in ("-v", "--verbose") for word in given)
+    given = [word for word in given if word not in ("-v", "--verbose")]
+    sys.exit(run(given, verbose))
+
+
+def run(given: list[str], verbose: bool = False) -> int:
+    """Run one command; the exit code."""
+    _configure_logging(verbose)
+    try:
+        if given in ([], ["-h"], ["--help"]):
+            _show_verbs()
+            return 0
+        if given == ["--version"]:
+            _say(f"nrdf {nrdf.__version__}")
+            return 0
+        import tyro
+
+        code = tyro.extras.subcommand_cli_from_dict(
+            {name: _with_joined_lines(verb) for name, verb in verbs().items()},
+            prog="nrdf",
+            args=given,
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+        return code or 0
+    except NrdfError as error:
+        _complain(str(error))
+        return error.exit_code
+    except KeyboardInterrupt:
+        _complain("interrupted; nothing half-written was left behind")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone (`nrdf info | head`): nothing more to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _show_verbs() -> None:
+    from nrdf.commands.console import table
+
+    shown = table("", "", "")
+    shown.show_header = False
+    shown.columns[1].justify = "left"
+    for name, verb in verbs().items():
+        shown.add_row(f"  {name}", (verb.__doc__ or "").partition("\n")[0])
+    _say(USAGE)
+    _say(shown)
+    _say(NOTES)
+
+
+def _say(what: Any) -> None:
+    from nrdf.commands.console import console
+
+    console.print(what)
+
+
+def _with_joined_lines(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """The verb, its docstring's arguments on one line each: tyro would keep the line breaks."""
+    verb.__doc__ = re.sub(r"\n {12}", " ", verb.__doc__ or "")
+    return verb
+
+
+def _complain(message: str) -> None:
+    from rich.markup import escape
+
+    from nrdf.commands.console import errors
+
+    errors.print(f"[bold red]nrdf:[/] [red]{escape(message)}[/]", soft_wrap=True)
+
+
+def _configure_logging(verbose: bool) -> None:
+    from rich.logging import RichHandler
+
+    from nrdf.commands.console import errors
+
+    handler = RichHandler(console=errors, show_time=verbose, show_path=verbose, markup=False)
+    logger = logging.getLogger("nrdf")
+    logger.handlers = [handler]
+    logger.setLevel(logging.DEBUG if verbose else logging.INFO)
+    logger.propagate = False
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The command line's verbs, one function each; what they need is imported when they run."""

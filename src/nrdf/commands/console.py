@@ -1,0 +1,75 @@
+"""What the verbs share: the terminal, progress bars, the words of a report."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+console = Console(highlight=False)
+"""Results go to standard output."""
+errors = Console(stderr=True, highlight=False)
+"""Progress, warnings and errors go to standard error."""
+
+REPORTED = ("nrdf", "torch", "numpy", "scipy", "trimesh", "libigl", "safetensors", "tyro")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    found = {"python": platform.python_version()}
+    for name in REPORTED:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def table(title: str, *columns: str) -> Table:
+    """A plain table; the first column is text, the others are numbers."""
+    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    for i, column in enumerate(columns):
+        made.add_column(column, justify="left" if i == 0 else "right", header_style="dim")
+    return made
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A callback (done, total) that draws a bar with the remaining time on a terminal."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        console=errors,
+        disable=not errors.is_terminal,
+    ) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
+
+
+def provenance(metadata: dict[str, Any]) -> dict[str, Any]:
+    """Of a model's metadata, what a report says about where the model comes from."""
+    keys = ("name", "file", "category", "preset", "commit", "date", "scores", "shapes")
+    return {key: metadata[key] for key in keys if key in metadata}
+
+
+def command_line() -> str:
+    """The command as it was typed."""
+    import shlex
+
+    return shlex.join(["nrdf", *sys.argv[1:]])

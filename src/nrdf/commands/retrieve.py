@@ -1,0 +1,239 @@
+"""`nrdf retrieve`: the regions of a reference, found on a target."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from nrdf.commands.console import command_line, console, provenance, table, versions
+from nrdf.errors import RegionError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from nrdf.cloud import PointCloud
+    from nrdf.picture import Panel
+    from nrdf.regions.model import Match
+
+log = logging.getLogger(__name__)
+
+
+def retrieve(
+    model: str,
+    reference: Path,
+    region: tuple[Path, ...],
+    target: Path,
+    out: Path,
+    method: Literal["mask", "points"] = "mask",
+    device: str = "cpu",
+    overwrite: bool = False,
+) -> None:
+    """Find the regions of a reference object on a target object of the same category.
+
+    Writes into the output folder: for each region a PLY of the target's own points in it, with
+    confidence (0 to 1) and index (into the target) as properties; report.json; picture.png. All
+    in the target file's own coordinates and unit.
+
+    Example: nrdf retrieve --model chair --reference ref.ply --region seat.ply back.ply --target
+    new.ply --out result/
+
+    Args:
+        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder.
+        reference: Cloud or mesh of the object on which the regions are known: +X forward, +Y up;
+            any unit, scale and place.
+        region: One file a region, named by it: a cloud whose points lie on the reference, a .npy of
+            points (m, 3), of a mask (n,) or of indices (m,) of the reference's points; or a .npz
+            of such arrays, one a region.
+        target: Cloud or mesh of the object to find them on, in the same frame; any unit.
+        out: Folder to write; made if missing.
+        method: mask: each target point asks the mapped reference points nearest to it;
+            points: each region point's prediction is snapped to the target (the paper's).
+        device: cpu, cuda, cuda:N or auto.
+        overwrite: Replace an earlier result in the output folder.
+    """
+    from nrdf.output import output_folder
+
+    with output_folder(out, overwrite) as folder:
+        clock = Clock()
+        import nrdf
+        from nrdf.picture import draw_regions
+
+        loaded = nrdf.load_model(model, device)
+        clock.lap("load model")
+        reference_cloud, target_cloud = nrdf.read_cloud(reference), nrdf.read_cloud(target)
+        regions = read_regions(region)
+        clock.lap("read files")
+        taught = loaded.set_reference(reference_cloud)
+        clock.lap("reference")
+        embedded = loaded.embed(target_cloud)
+        matches = taught.retrieve_all(regions, embedded, method)
+        clock.lap("target and regions")
+        title = f"{reference.name} (reference)"
+        panels = [
+            region_panel(title, reference_cloud, reference_indices(regions, reference_cloud)),
+            region_panel(target.name, target_cloud, {n: m.indices for n, m in matches.items()}),
+        ]
+        write_matches(folder, target_cloud, matches)
+        draw_regions(panels, folder / "picture.png")
+        clock.lap("write")
+        report = {
+            "command": command_line(),
+            "model": provenance(loaded.metadata),
+            "method": method,
+            "reference": describe_cloud(reference, reference_cloud),
+            "target": describe_cloud(target, target_cloud),
+            "coordinates": "the target file's own frame and unit",
+            "regions": describe_matches(matches, target_cloud),
+            "seconds": {**clock.seconds, "of the target": embedded.seconds},
+            "versions": versions(),
+        }
+        write_report(folder, report)
+    show_matches(matches, target_cloud)
+    console.print(f"[dim]{clock.total:.1f} s; results, report and picture in[/] {out}")
+
+
+class Clock:
+    """Seconds between laps by name."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name] = round(now - self._last, 4)
+        self._last = now
+
+    @property
+    def total(self) -> float:
+        return sum(self.seconds.values())
+
+
+def read_regions(paths: tuple[Path, ...]) -> dict[str, np.ndarray]:
+    """Regions by name from files: points (m, 3), masks (n,) or indices (m,).
+
+    Raises RegionError for no file, arrays that cannot be read, names that occur twice or cannot be
+    file names, and CloudError for unreadable clouds.
+    """
+    regions: dict[str, np.ndarray] = {}
+    if not paths:
+        raise RegionError("no region given; name at least one file after --region")
+    for path in paths:
+        for name, values in _read_region_file(path).items():
+            if name in regions:
+                raise RegionError(f"two regions are called '{name}'; rename one of the files")
+            if not re.fullmatch(r"\w[\w .+-]*", name):
+                raise RegionError(
+                    f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
+                    "any of . + - _ are allowed, because it becomes a file name"
+                )
+            regions[name] = values
+    return regions
+
+
+def _read_region_file(path: Path) -> dict[str, np.ndarray]:
+    import zipfile
+
+    import numpy as np
+
+    from nrdf.cloud import read_cloud
+
+    if path.suffix.lower() in (".npy", ".npz"):
+        try:
+            with open(path, "rb") as file:
+                loaded = np.load(file, allow_pickle=False)
+                if isinstance(loaded, np.ndarray):
+                    return {path.stem: loaded}
+                if "points" not in loaded:
+                    return {name: loaded[name] for name in loaded.files}
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise RegionError(f"cannot read the region file {path}: {error}") from None
+    return {path.stem: read_cloud(path).points}
+
+
+def reference_indices(
+    regions: Mapping[str, np.ndarray], reference: PointCloud
+) -> dict[str, np.ndarray]:
+    """Each region as indices of the reference's points."""
+    from nrdf.regions.region import region_indices
+
+    return {name: region_indices(values, reference) for name, values in regions.items()}
+
+
+def region_panel(
+    title: str, cloud: PointCloud, regions: Mapping[str, np.ndarray], note: str = ""
+) -> Panel:
+    from nrdf.picture import Panel
+
+    return Panel(title, cloud.points, cloud.normals, dict(regions), note)
+
+
+def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
+    """Write <region>.ply for each match into a folder."""
+    import numpy as np
+
+    from nrdf.cloud import write_cloud
+    from nrdf.picture import region_colours
+
+    colours = region_colours(list(matches))
+    for name, match in matches.items():
+        # Paler where less certain.
+        strength = 0.25 + 0.75 * match.confidence[:, None]
+        mixed = strength * colours[name] + (1 - strength)
+        write_cloud(
+            folder / f"{name}.ply",
+            target.select(match.indices),
+            colours=(255 * mixed).astype(np.uint8),
+            scalars={"confidence": match.confidence, "index": match.indices},
+        )
+
+
+def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:
+    return {
+        "file": str(path),
+        "points": len(cloud),
+        "normals": "given" if cloud.normals is not None else "estimated",
+        "unit": cloud.unit,
+        "frame": cloud.frame,
+        "bounding_box": [cloud.points.min(axis=0).tolist(), cloud.points.max(axis=0).tolist()],
+    }
+
+
+def describe_matches(matches: Mapping[str, Match], target: PointCloud) -> dict[str, Any]:
+    return {
+        name: {
+            "file": f"{name}.ply",
+            "points": len(match.indices),
+            "share_of_target": round(len(match.indices) / len(target), 5),
+            "mean_confidence": round(match.score, 4),
+            "centre": target.points[match.indices].mean(axis=0).tolist()
+            if len(match.indices)
+            else None,
+        }
+        for name, match in matches.items()
+    }
+
+
+def write_report(folder: Path, report: dict[str, Any]) -> None:
+    """Write report.json, with the time and the list of all files beside it."""
+    from datetime import datetime, timezone
+
+    from nrdf.output import REPORT, write_json
+
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    date = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_json(folder / REPORT, {"date": date, **report, "files": [*files, REPORT]})
+
+
+def show_matches(matches: Mapping[str, Match], target: PointCloud) -> None:
+    shown = table("", "region", "points", "of the target", "mean confidence")
+    for name, match in matches.items():
+        share = len(match.indices) / len(target)
+        shown.add_row(name, f"{len(match.indices)}", f"{share:.1%}", f"{match.score:.2f}")
+        if not len(match.indices):
+            log.warning("region '%s' was found nowhere on the target", name)
+    console.print(shown)

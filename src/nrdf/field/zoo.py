@@ -1,0 +1,179 @@
+"""The weights that ship with the package: by name, verified by checksum, with their provenance.
+
+The zoo is a folder of weight files (`nrdf.field.weights`) and an `index.json` that says of each
+one its SHA-256, preset, category, scores, training shapes by source with licences, commit and date.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nrdf.errors import ModelError, OutputError, unknown_name
+from nrdf.field.base import Field
+from nrdf.field.weights import load_weights, read_metadata
+
+log = logging.getLogger(__name__)
+
+ZOO = Path(__file__).resolve().parents[1] / "zoo"
+INDEX = "index.json"
+LARGEST = 8_000_000
+"""Bytes that a weight file in the zoo may have."""
+WEIGHTS = "weights.safetensors"
+"""What a finished training run calls its weight file."""
+
+
+@dataclass(frozen=True)
+class ZooEntry:
+    """One model of the zoo. scores: name to value, lower is better; shapes: source to count and
+    licences of the training shapes."""
+
+    name: str
+    file: str
+    sha256: str
+    bytes: int
+    category: str
+    preset: str
+    scores: dict[str, float] = field(default_factory=dict)
+    shapes: dict[str, Any] = field(default_factory=dict)
+    commit: str | None = None
+    date: str | None = None
+    note: str = ""
+
+
+def list_models(zoo: Path = ZOO) -> list[ZooEntry]:
+    """The models of the zoo by name; none if there is no index.
+
+    Raises ModelError if the index is damaged.
+    """
+    path = zoo / INDEX
+    if not path.is_file():
+        return []
+    try:
+        models = json.loads(path.read_text(encoding="utf-8"))["models"]
+        return [ZooEntry(name=name, **models[name]) for name in sorted(models)]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path} is damaged ({error}); install nrdf again") from None
+
+
+def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
+    """The weight file of a zoo name, of a path to one, or of a finished training run's folder.
+
+    Raises ModelError for an unknown name (listing the known ones), a run that has not finished, a
+    file that is missing, and a file of the zoo that differs from its checksum.
+    """
+    models = {entry.name: entry for entry in list_models(zoo)}
+    if str(name) in models:
+        return _verified(zoo, models[str(name)])
+    path = Path(name)
+    if path.is_dir():
+        if not (path / WEIGHTS).is_file():
+            raise ModelError(
+                f"the folder {path} holds no {WEIGHTS}: its training run has not finished (start "
+                "the same `nrdf train` again to go on), or it is no training run"
+            )
+        return path / WEIGHTS
+    if path.is_file():
+        return path
+    raise ModelError(
+        f"{unknown_name('model', str(name), list(models))}; or give the path of a weight file "
+        "(.safetensors) or of a finished training run's folder"
+    )
+
+
+def load_field(name: str | Path, zoo: Path = ZOO) -> tuple[Field, dict[str, Any]]:
+    """The field of a zoo name or path, on the CPU in evaluation mode, and its metadata.
+
+    The metadata are the weight file's, with `name` and `file` added; `scores` of the zoo's index
+    come before those of the file. Raises ModelError (`find_weights`, `load_weights`).
+    """
+    path = find_weights(name, zoo)
+    loaded, metadata = load_weights(path)
+    for entry in list_models(zoo):
+        if path == zoo / entry.file:
+            metadata = {**metadata, "scores": {**metadata.get("scores", {}), **entry.scores}}
+    return loaded, {**metadata, "name": str(name), "file": path.name}
+
+
+def add_to_zoo(
+    weights: str | Path,
+    name: str | None = None,
+    scores: Mapping[str, float] | None = None,
+    note: str = "",
+    zoo: Path = ZOO,
+) -> ZooEntry:
+    """Copy a weight file into the zoo and enter it into the index, replacing one of that name.
+
+    `name` is the category unless given; `scores` are added to those in the file. Raises ModelError
+    for a file that is damaged or larger than 8 MB, OutputError if the zoo cannot be written.
+    """
+    path = find_weights(weights, zoo)
+    metadata = read_metadata(path)
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise ModelError(
+            f"{path} has {size / 1e6:.1f} MB; the zoo takes at most {LARGEST / 1e6:.0f} MB: "
+            "train a smaller field"
+        )
+    name = name or str(metadata["category"])
+    entry = ZooEntry(
+        name=name,
+        file=f"{name}.safetensors",
+        sha256=_sha256(path),
+        bytes=size,
+        category=str(metadata["category"]),
+        preset=str(metadata["preset"]),
+        scores={**metadata.get("scores", {}), **(scores or {})},
+        shapes=metadata.get("shapes", {}),
+        commit=metadata.get("commit"),
+        date=metadata.get("date"),
+        note=note,
+    )
+    entries = {known.name: known for known in list_models(zoo)} | {name: entry}
+    try:
+        zoo.mkdir(parents=True, exist_ok=True)
+        temporary = zoo / f".{entry.file}.{os.getpid()}.tmp"
+        shutil.copyfile(path, temporary)
+        os.replace(temporary, zoo / entry.file)
+        _write_index(zoo, entries)
+    except OSError as error:
+        raise OutputError(f"cannot write to the zoo {zoo}: {error.strerror or error}") from None
+    log.info("%s is in the zoo as '%s'", path, name)
+    return entry
+
+
+def _write_index(zoo: Path, entries: Mapping[str, ZooEntry]) -> None:
+    models = {}
+    for name in sorted(entries):
+        models[name] = asdict(entries[name])
+        del models[name]["name"]
+    temporary = zoo / f".{INDEX}.{os.getpid()}.tmp"
+    text = json.dumps({"models": models}, indent=2, ensure_ascii=False)
+    temporary.write_text(text + "\n", encoding="utf-8")
+    os.replace(temporary, zoo / INDEX)
+
+
+def _verified(zoo: Path, entry: ZooEntry) -> Path:
+    path = zoo / entry.file
+    if not path.is_file():
+        raise ModelError(f"the zoo's file {path} is missing; install nrdf again")
+    if _sha256(path) != entry.sha256:
+        raise ModelError(
+            f"the zoo's file {path} was altered or truncated: its SHA-256 is not the one in "
+            f"{INDEX}; install nrdf again"
+        )
+    return path
+
+
+def _sha256(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise ModelError(f"cannot read {path}: {error.strerror or error}") from None
