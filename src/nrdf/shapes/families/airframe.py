@@ -86,9 +86,9 @@ class Fuselage:
         )
 
 
-def _rising(x: Sequence[float], gap: float = 0.012) -> Array:
-    """x made to rise from 0 to 1 by at least `gap` each."""
-    x = np.asarray(x, float).copy()
+def _rising(stations: Sequence[float], gap: float = 0.012) -> Array:
+    """The stations made to rise from 0 to 1 by at least `gap` each."""
+    x = np.array(stations, float)
     x[0], x[-1] = 0.0, 1.0
     for i in range(1, len(x) - 1):
         x[i] = max(x[i], x[i - 1] + gap)
@@ -218,7 +218,7 @@ class Surface:
             return self.edge(s) + self._forward(s) - half(s)
 
         section = Airfoil(
-            rounded(half, 0.0, self.tip), linear([0, 1], self.thick), self.camber, edge=0.012
+            rounded(half, 0.0, self.tip), linear([0, 1], self.thick), self.camber, edge=0.022
         )
         eta = min(max(root / self.reach, 0.01), 0.8)
         inner = [0, ROOT_V, 1], [0, eta, 1]

@@ -36,7 +36,7 @@ def ramp(x: Array, radius: Array | float) -> Array:
 
 
 def filleted(
-    knots: Sequence[float], values: Sequence[float], radii: Sequence[float]
+    knots: Sequence[float], values: Sequence[float] | Array, radii: Sequence[float]
 ) -> Callable[[Array], Array]:
     """Straight lines through (knots, values), each inner corner rounded by a parabola.
 

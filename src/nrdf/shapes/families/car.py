@@ -65,11 +65,11 @@ class CarFamily(Family):
         parts = [body, *_wheels(d, work, bow, rng)]
         if rng.random() < 0.65:
             parts += _mirrors(d, work, bow, rng)
-        if rng.random() < 0.2:
+        if rng.random() < 0.12:
             parts += _bumpers(d, work, bow, rng)
-        if rng.random() < 0.25:
+        if rng.random() < 0.2:
             parts += _spoiler(d, work, rng)
-        if d["upright"] and rng.random() < 0.35:
+        if d["upright"] and d["height"] > 1.5 and rng.random() < 0.4:
             parts += _rails(d, work, rng)
         if d["upright"] and d["roof_end"] > 0.85 and rng.random() < 0.15:
             parts.append(_spare(d, rng))
@@ -200,6 +200,13 @@ def _half_width(work: Bodywork, x: float, y: float) -> float:
     return max(float(plain.breadth(np.array([y]), np.array([x / work.length]))[0]), 0.0)
 
 
+def _roof_height(work: Bodywork, s: Array, z: float) -> Array:
+    """Height of the body's upper side at the stations s (n,), at the distance z from the middle."""
+    y = work.curves(s)[1][:, None] - np.linspace(0, 0.3, 301)
+    wide = work.breadth(y.ravel(), np.repeat(s, 301)).reshape(y.shape) >= z
+    return y[np.arange(len(s)), wide.argmax(1)]
+
+
 def _place(bow: Warp, point: Sequence[float]) -> Array:
     return bow.forward(np.asarray(point, float)[None])[0]
 
@@ -267,11 +274,12 @@ def _spoiler(d: Mapping[str, float], work: Bodywork, rng: np.random.Generator) -
     chord = rng.uniform(0.1, 0.2)
     half = d["width"] / 2 * rng.uniform(0.6, 0.95)
     if d["roof_end"] > 0.82:  # at the rear edge of a roof
-        x = (1 - d["roof_end"]) * length - 0.5 * chord
-        y = d["height"] - d["roof_drop"] - rng.uniform(0.0, 0.03)
-        half = min(half, 0.85 * _half_width(work, x + 0.8 * chord, y - 0.12))
+        edge = (1 - d["roof_end"]) * length + 0.03
+        y = float(work.curves(np.array([edge / length]))[1][0]) - 0.02
+        half = min(half, 0.9 * _half_width(work, edge, y - 0.04))
         if half < 0.3:
             return []
+        x = edge - 0.3 * chord
         return [blob("spoiler", 2, -half, half, (chord, 0.03), (x, y), 3.0, (0.15, 0.15))]
     x = (1 - d["boot_edge"]) * length + chord
     deck = float(work.curves(np.array([x / length]))[1][0])
@@ -295,17 +303,12 @@ def _rails(d: Mapping[str, float], work: Bodywork, rng: np.random.Generator) -> 
     if stop - start < 0.6:
         return []
     s = np.linspace(start, stop, 9) / d["length"]
-    top = work.curves(s)[1]
-    z = 0.72 * _half_width(work, 0.5 * (start + stop), float(top[4]) - 0.1)
-    lift = [
-        work.breadth(np.linspace(t - 0.25, t, 200), np.full(200, x)) > z
-        for t, x in zip(top, s, strict=True)
-    ]
-    height = [t - 0.25 + 0.25 * np.count_nonzero(ok) / 200 for t, ok in zip(top, lift, strict=True)]
+    z = 0.72 * _half_width(work, 0.5 * (start + stop), d["height"] - 0.13)
+    height = _roof_height(work, s, z) + 0.02
     rail = Part(
         "rail-right", 0, start, stop,
         Superellipse(rounded(rng.uniform(0.03, 0.05), 0.08, 0.08), 0.02, 3.0),
-        centre=(linear(np.linspace(0, 1, 9).tolist(), height), z),
+        centre=(linear(np.linspace(0, 1, 9).tolist(), height.tolist()), z),
     )  # fmt: skip
     return [rail, rail.mirrored("rail-left")]
 

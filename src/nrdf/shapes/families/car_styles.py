@@ -47,7 +47,7 @@ _NAMES = [row.split()[0] for row in _STYLES.strip().splitlines()]
 _TABLE = _UNIT * [[float(x) for x in row.split()[1:]] for row in _STYLES.strip().splitlines()]
 _UPRIGHT = {"suv", "off-roader", "pickup", "crossover", "coupe-suv", "estate", "mpv", "van"}
 _SPREAD = {
-    "length": 0.05, "width": 0.035, "height": 0.04, "ride": 0.15, "wheel": 0.04,
+    "length": 0.05, "width": 0.03, "height": 0.04, "ride": 0.15, "wheel": 0.04,
     "bonnet_edge": 0.3, "screen_base": 0.05, "roof_drop": 0.4, "tumblehome": 0.2,
 }  # fmt: skip
 """Standard deviation of the logarithm."""
@@ -73,6 +73,10 @@ def random_style(rng: np.random.Generator) -> Mapping[str, float]:
         d[key] *= d["height"] / height * np.exp(0.03 * normal())
     for key in ("screen_top", "roof_end", "front_axle", "rear_axle"):
         d[key] += 0.012 * normal()
+    d["width"] = max(d["width"], 0.38 * d["length"])
+    overhang = 1.22 * d["wheel"] / d["length"] + 0.01
+    d["front_axle"] = max(d["front_axle"], overhang)
+    d["rear_axle"] = min(d["rear_axle"], 1 - overhang)
     d["bonnet_y"] = min(d["bonnet_y"], d["screen_y"] - 0.04)
     d["boot_y"] = min(d["boot_y"], d["height"] - d["roof_drop"] - 0.12)
     d["tail_y"] = min(d["tail_y"], d["boot_y"] + 0.02)

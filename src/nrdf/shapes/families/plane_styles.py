@@ -22,7 +22,7 @@ regional    6 43 100 20 110 330  770 190 26 25 440 -70  3 11 300  95 28 190 150 
 trijet      3 50 100 20 110 330  850 230 25 34 390 -65  5 12 340 110 36 200 180 42
 bizjet      8 57 100 20 180 350  920 175 30 22 430 -80  3 11 380  95 26 205 160 44
 turboprop   5 52 100 20 130 380 1060 120 50  3 370  85  2 15 340 100  8 230 170 32
-transport   3 68 105 23 130 400 1120 155 45  8 350  88 -1 15 430 120 15 270 180 30
+transport   4 68 105 23 130 400 1120 155 45  8 350  88 -1 15 430 120 15 270 180 30
 twin        5 68  90 24 260 450 1180 175 55  4 330 -60  6 14 390 110 10 210 150 32
 high-wing   8 80  88 28 160 520 1350 185 78  1 240  95  2 13 400 120  5 200 150 30
 low-wing    7 74  92 26 180 520 1250 190 70  3 270 -75  6 14 370 115  8 200 150 30
@@ -46,18 +46,18 @@ _RECIPES = {
     "trijet": ("tube", "low tee", "pod-3 rear-3"),
     "bizjet": ("sleek", "tee mid tee low", "rear-2 rear-2 rear-2 rear-3 rear-2"),
     "turboprop": ("tube", "tee low tee mid", "prop-2"),
-    "transport": ("tube", "tee low", "pod-4 prop-4 pod-2 prop-2"),
+    "transport": ("tube", "tee low", "pod-4 prop-4 prop-4 pod-2"),
     "twin": ("cabin", "low low tee mid", "prop-2"),
     "high-wing": ("cabin", "low low low mid", "nose nose nose none"),
     "low-wing": ("cabin", "low low mid tee vee", "nose nose nose none"),
     "warbird": ("warbird", "low", "nose nose nose none"),
     "fighter": ("jet", "low low mid", "none"),
-    "delta": ("jet", "none none none canard", "none"),
+    "delta": ("jet", "none none canard", "none none nozzles"),
     "twin-fin": ("jet", "twin", "nozzles"),
     "interceptor": ("jet", "low low tee mid", "none none nozzles"),
     "attack": ("jet", "low low mid ends vee", "none rear-2 pod-2 nozzles"),
     "glider": ("pod", "tee tee low vee", "none"),
-    "bomber": ("tube", "low ends", "prop-4 prop-2"),
+    "bomber": ("tube", "low ends", "prop-4 prop-4 prop-2"),
 }
 """Fuselage, and the tails and engines to draw from.
 
