@@ -11,12 +11,7 @@ from nrdf.commands.console import command_line, console, provenance, table, vers
 if TYPE_CHECKING:
     import numpy as np
 
-    from nrdf.cloud import PointCloud
     from nrdf.regions.model import Match
-
-BUNDLED = Path(__file__).resolve().parents[1] / "bundled"
-REFERENCE = "reference"
-TARGETS = ("ladder-back", "rocker", "armchair")
 
 
 def demo(
@@ -36,6 +31,7 @@ def demo(
         device: cpu, cuda, cuda:N or auto.
         overwrite: Replace an earlier demo in the output folder.
     """
+    from nrdf.bundled import REFERENCE, TARGETS
     from nrdf.output import output_folder
 
     with output_folder(out, overwrite) as folder:
@@ -63,29 +59,6 @@ class Found:
     seconds: float
 
 
-def bundled(name: str) -> tuple[PointCloud, dict[str, np.ndarray]]:
-    """A bundled chair (8192 points, metres) and its regions as masks (8192,).
-
-    Raises DataError if the file is missing or damaged.
-    """
-    import zipfile
-
-    import numpy as np
-
-    from nrdf.cloud import PointCloud
-    from nrdf.errors import DataError
-
-    try:
-        with np.load(BUNDLED / f"{name}.npz", allow_pickle=False) as arrays:
-            cloud = PointCloud(arrays["points"], unit="m")
-            names, region = arrays["regions"].tolist(), arrays["region"]
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise DataError(
-            f"the bundled chair '{name}' is damaged ({error}); install nrdf again"
-        ) from None
-    return cloud, {name: region == i for i, name in enumerate(names) if i}
-
-
 def overlap(indices: np.ndarray, truth: np.ndarray) -> float:
     """Intersection over union of found indices (k,) and a true mask (n,); 1 if both are empty."""
     common = int(truth[indices].sum())
@@ -97,11 +70,12 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     import time
 
     import nrdf
+    from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
     from nrdf.commands.retrieve import region_panel, write_matches, write_report
     from nrdf.picture import draw_regions
 
     loaded = nrdf.load_model(model, device)
-    reference, regions = bundled(REFERENCE)
+    reference, regions = bundled_chair(REFERENCE)
     taught = loaded.set_reference(reference)
     nrdf.write_cloud(folder / f"{REFERENCE}.ply", reference)
     (folder / REFERENCE).mkdir()
@@ -110,7 +84,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     panels = [region_panel(REFERENCE, reference, regions, "its five regions, given")]
     results: list[Found] = []
     for chair in TARGETS:
-        target, truth = bundled(chair)
+        target, truth = bundled_chair(chair)
         start = time.perf_counter()
         matches = taught.retrieve_all(regions, target)
         seconds = time.perf_counter() - start

@@ -1,0 +1,22 @@
+"""Fixtures that several test modules share."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def untrained(tmp_path_factory):
+    """A weight file of the default preset with its initial weights, category chair."""
+    import torch
+
+    from nrdf.field import build_field
+    from nrdf.field.weights import save_weights
+
+    path = tmp_path_factory.mktemp("weights") / "untrained.safetensors"
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        field = build_field("default")
+    shapes = {"family": {"count": 3, "licences": {"MIT": 3}}}
+    save_weights(path, field, {"category": "chair", "shapes": shapes, "scores": {"own": 0.5}})
+    return path

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from nrdf.errors import OutputError
+from nrdf.geometry import fibonacci_directions
+from nrdf.picture import Camera, Panel, draw_regions, region_colours
+
+BALL = fibonacci_directions(4000)
+
+
+def drawn(tmp_path, panels, size=200):
+    path = tmp_path / "picture.png"
+    draw_regions(panels, path, size)
+    return matplotlib.image.imread(path)[..., :3]
+
+
+def like(image, colour, tolerance=0.2):
+    """Pixels of a colour's hue, whatever their brightness."""
+    unit = colour / np.linalg.norm(colour)
+    cosine = image @ unit / np.maximum(np.linalg.norm(image, axis=-1), 1e-9)
+    return (cosine > 1 - tolerance**2) & (np.ptp(image, axis=-1) > 0.15)
+
+
+def test_camera_axes_are_right_handed_and_show_what_is_up_as_up():
+    axes = Camera(0.65, 0.38).axes()
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) > 0
+    assert axes[1] @ [0, 1, 0] > 0
+    # From the front right, the object's right-hand side (+Z) is on the viewer's left.
+    assert axes[0] @ [0, 0, 1] < 0 < axes[2] @ [1, 0, 0]
+
+
+def test_regions_are_where_they_belong(tmp_path):
+    names = ["upper", "right"]
+    colours = region_colours(names)
+    regions = {
+        "upper": BALL[:, 1] > 0.5,
+        "right": np.flatnonzero((BALL[:, 1] < 0.2) & (BALL[:, 2] > 0.5)),
+    }
+    image = drawn(tmp_path, [Panel("ball", BALL, BALL, regions)], 300)
+    body = image[40:-60]
+    upper, right = like(body, colours["upper"]), like(body, colours["right"])
+    assert upper.sum() > 2000 and right.sum() > 2000
+    rows, columns = np.arange(body.shape[0])[:, None], np.arange(body.shape[1])
+    assert (upper * rows).sum() / upper.sum() < (right * rows).sum() / right.sum()
+    assert (right * columns).sum() / right.sum() < body.shape[1] / 2
+
+
+def test_surface_is_closed_and_background_white(tmp_path):
+    image = drawn(tmp_path, [Panel("ball", BALL, BALL)], 300)[40:-10]
+    painted = (image < 0.99).any(-1)
+    rows, columns = np.nonzero(painted)
+    centre = np.array([rows.min() + rows.max(), columns.min() + columns.max()]) / 2
+    radius = (columns.max() - columns.min()) / 2
+    grid = np.indices(painted.shape) - centre[:, None, None]
+    distance = np.hypot(*grid)
+    assert painted[distance < 0.96 * radius].mean() > 0.999
+    assert painted[distance > 1.04 * radius].mean() < 0.001
+
+
+def test_hidden_region_adds_a_view_from_where_it_is_seen(tmp_path):
+    colour = region_colours(["far"])["far"]
+    near = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] > 0.8})])
+    far = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] < -0.8})])
+    assert far.shape[0] > 1.5 * near.shape[0]
+    half = far.shape[0] // 2
+    assert like(far[half:-50], colour).sum() > 500 > like(far[:half], colour).sum()
+
+
+def test_panels_are_side_by_side_and_share_the_colours(tmp_path):
+    first = Panel("a", BALL, None, {"x": BALL[:, 0] > 0.5})
+    second = Panel("b", 1000 * BALL + 5, BALL, {"y": BALL[:, 0] > 0.5, "none": np.empty(0, int)})
+    image = drawn(tmp_path, [first, second])
+    assert image.shape[1] == 400
+    colours = region_colours(["x", "y"])
+    body = image[:-60]
+    assert like(body[:, :200], colours["x"]).sum() > 200 > like(body[:, 200:], colours["x"]).sum()
+    assert like(body[:, 200:], colours["y"]).sum() > 200 > like(body[:, :200], colours["y"]).sum()
+
+
+def test_unwritable_path_is_an_output_error_and_leaves_nothing(tmp_path):
+    with pytest.raises(OutputError, match="cannot write the picture"):
+        draw_regions([Panel("ball", BALL, BALL)], tmp_path / "none" / "x.png", 60)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_region_has_its_own_colour():
+    colours = region_colours([str(i) for i in range(12)])
+    assert len({tuple(colour) for colour in colours.values()}) == 12

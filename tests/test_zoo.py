@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nrdf.errors import ModelError
+from nrdf.field import zoo
+from nrdf.field.zoo import add_to_zoo, find_weights, list_models, load_field
+
+
+@pytest.fixture
+def stocked(tmp_path, untrained):
+    """A zoo that holds one model, chair."""
+    add_to_zoo(untrained, scores={"bsrc": 0.03}, note="a test", zoo=tmp_path / "zoo")
+    return tmp_path / "zoo"
+
+
+def test_added_model_loads_with_its_provenance(stocked, untrained):
+    (entry,) = list_models(stocked)
+    assert (entry.name, entry.preset, entry.category) == ("chair", "default", "chair")
+    assert entry.scores == {"own": 0.5, "bsrc": 0.03}
+    assert entry.shapes == {"family": {"count": 3, "licences": {"MIT": 3}}}
+    assert entry.bytes == untrained.stat().st_size
+    field, metadata = load_field("chair", stocked)
+    assert field.preset == "default" and not field.training
+    assert metadata["name"] == "chair" and metadata["scores"]["bsrc"] == 0.03
+
+
+def test_second_model_joins_and_same_name_replaces(stocked, untrained):
+    add_to_zoo(untrained, name="chair-2", zoo=stocked)
+    add_to_zoo(untrained, scores={"bsrc": 0.02}, zoo=stocked)
+    assert {e.name: e.scores.get("bsrc") for e in list_models(stocked)} == {
+        "chair": 0.02,
+        "chair-2": None,
+    }
+    assert {p.name for p in stocked.iterdir()} == {
+        "chair.safetensors",
+        "chair-2.safetensors",
+        "index.json",
+    }
+
+
+def test_unknown_model_lists_the_known(stocked):
+    with pytest.raises(ModelError, match=r"no model 'chiar'; known: chair; or give the path"):
+        find_weights("chiar", stocked)
+
+
+@pytest.mark.parametrize("damage", ["flip", "truncate"])
+def test_damaged_file_is_refused(stocked, damage):
+    path = stocked / "chair.safetensors"
+    content = bytearray(path.read_bytes())
+    if damage == "flip":
+        content[-1] ^= 1
+    else:
+        del content[-100:]
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match=r"altered or truncated"):
+        load_field("chair", stocked)
+
+
+def test_damaged_index_is_refused(stocked):
+    (stocked / "index.json").write_text("{")
+    with pytest.raises(ModelError, match=r"index\.json is damaged"):
+        list_models(stocked)
+    (stocked / "index.json").write_text(json.dumps({"models": {"chair": {"file": "x"}}}))
+    with pytest.raises(ModelError, match=r"index\.json is damaged"):
+        list_models(stocked)
+
+
+def test_paths_load_too(tmp_path, untrained):
+    assert load_field(untrained, tmp_path)[1]["category"] == "chair"
+    run = tmp_path / "run"
+    run.mkdir()
+    with pytest.raises(ModelError, match="has not finished"):
+        load_field(run, tmp_path)
+    (run / "weights.safetensors").write_bytes(untrained.read_bytes())
+    assert load_field(str(run), tmp_path)[0].preset == "default"
+
+
+def test_too_large_a_file_is_refused(tmp_path, untrained, monkeypatch):
+    monkeypatch.setattr(zoo, "LARGEST", untrained.stat().st_size - 1)
+    with pytest.raises(ModelError, match="at most"):
+        add_to_zoo(untrained, zoo=tmp_path / "zoo")
+    assert list_models(tmp_path / "zoo") == []
+
+
+def test_shipped_models_are_whole():
+    for entry in list_models():
+        assert entry.bytes <= zoo.LARGEST
+        assert load_field(entry.name)[1]["category"] == entry.category
