@@ -9,7 +9,8 @@ import torch
 
 from nrdf.errors import ConfigError, DataError
 from nrdf.training.config import AugmentConfig
-from nrdf.training.data import Bank, list_shapes, load_bank
+from nrdf.training.data import Bank, load_bank
+from nrdf.training.provenance import list_shapes
 from tiny_field import Ball, balls, tiny_config, write_folder
 
 CONFIG = tiny_config().data

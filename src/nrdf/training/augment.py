@@ -127,3 +127,20 @@ def draw_sample(
         inside = (surface - centre[:, None]).square().sum(-1) < radius.square()
         key = key - 100.0 * inside
     return key.topk(count, dim=1).indices
+
+
+def sensor_noise(
+    config: AugmentConfig, points: Tensor, normals: Tensor, generator: torch.Generator
+) -> tuple[Tensor, Tensor]:
+    """Points and unit normals (b, n, 3) with noise whose size differs from shape to shape."""
+
+    def noise(largest: float) -> Tensor:
+        size = torch.rand(len(points), 1, 1, generator=generator, device=points.device)
+        grain = torch.randn(points.shape, generator=generator, device=points.device)
+        return largest * size * grain
+
+    if config.noise > 0:
+        points = points + noise(config.noise)
+    if config.normal_noise > 0:
+        normals = torch.nn.functional.normalize(normals + noise(config.normal_noise), dim=-1)
+    return points, normals

@@ -12,16 +12,16 @@ from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from fnmatch import fnmatch
-from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from nrdf.errors import ConfigError, DataError
-from nrdf.shapes.dataset import Shape, read_index, read_shape
-from nrdf.training.augment import draw_deformation, draw_sample
+from nrdf.shapes.dataset import Shape, read_shape
+from nrdf.training.augment import draw_deformation, draw_sample, sensor_noise
 from nrdf.training.config import AugmentConfig, DataConfig
+from nrdf.training.provenance import Entry
 
 log = logging.getLogger(__name__)
 
@@ -221,7 +221,7 @@ class Bank:
         rows = torch.arange(len(chosen), device=self.device)[:, None]
         points, normals = surface[rows, sample], self.surface_normals[chosen[:, None], sample]
         clean_points, clean_normals = deform.points(points), deform.normals(points, normals)
-        points, normals = _sensor_noise(config.augment, clean_points, clean_normals, generator)
+        points, normals = sensor_noise(config.augment, clean_points, clean_normals, generator)
 
         pick = torch.randint(
             self.queries.shape[1],
@@ -301,21 +301,6 @@ def _pairs(sizes: Sequence[int], rolls: int, device: torch.device) -> tuple[Tens
     return reference.to(device), torch.cat(partners).to(device)
 
 
-def _sensor_noise(
-    config: AugmentConfig, points: Tensor, normals: Tensor, generator: torch.Generator
-) -> tuple[Tensor, Tensor]:
-    def noise(largest: float) -> Tensor:
-        size = torch.rand(len(points), 1, 1, generator=generator, device=points.device)
-        grain = torch.randn(points.shape, generator=generator, device=points.device)
-        return largest * size * grain
-
-    if config.noise > 0:
-        points = points + noise(config.noise)
-    if config.normal_noise > 0:
-        normals = torch.nn.functional.normalize(normals + noise(config.normal_noise), dim=-1)
-    return points, normals
-
-
 def _draw(rng: np.random.Generator, available: int, wanted: int, name: str) -> np.ndarray:
     """Indices (wanted,), in random order, repeated only when there are too few."""
     if available == 0:
@@ -345,25 +330,6 @@ def _pools(sources: list[str], shares: dict[str, float]) -> list[tuple[str, floa
         if not members[pattern]:
             log.warning("pool '%s' has no shapes and is left out", pattern)
     return [(p, share, members[p]) for p, share in patterns.items() if members[p] and share > 0]
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A shape that a data folder lists."""
-
-    path: Path
-    source: str
-    split: str
-    licence: str
-
-
-def list_shapes(folders: Sequence[Path]) -> list[Entry]:
-    """The shapes that the folders' `index.csv` list, in order (errors: `read_index`)."""
-    return [
-        Entry(folder / f"{row.name}.npz", row.source, row.split, row.licence)
-        for folder in folders
-        for row in read_index(folder)
-    ]
 
 
 def load_bank(

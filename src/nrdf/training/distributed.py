@@ -78,7 +78,7 @@ def choose_precision(name: str, device: torch.device) -> torch.dtype:
     """float32 or bfloat16; "auto" takes bfloat16 where it is faster."""
     if name == "auto":
         if device.type == "cuda":
-            pays = torch.cuda.is_bf16_supported(including_emulation=False)
+            pays = torch.cuda.get_device_capability(device)[0] >= 8  # Ampere and later
         else:
             pays = cpu_has_amx()
         return torch.bfloat16 if pays else torch.float32

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import logging
 import math
-import platform
 import signal
-import subprocess
 import threading
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -35,10 +32,11 @@ from nrdf.training.checkpoint import (
     write_identity,
 )
 from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
-from nrdf.training.data import Bank, Batch, Entry, list_shapes, load_bank, seeded
+from nrdf.training.data import Bank, Batch, load_bank, seeded
 from nrdf.training.distributed import Workers, choose_precision, join_workers
 from nrdf.training.losses import LOSSES, Forward
 from nrdf.training.progress import Display
+from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import validate
 
 log = logging.getLogger(__name__)
@@ -325,49 +323,6 @@ def not_finite(stage: Stage, step: int, terms: dict[str, Tensor]) -> str:
         f"step {step} (stage '{stage.name}') had no finite gradient and changed nothing; "
         f"not finite: {', '.join(blamed) or 'none of the losses, only a derivative'}"
     )
-
-
-def provenance(entries: Sequence[Entry]) -> dict[str, dict[str, Any]]:
-    """Number and licences of the training shapes by source."""
-    found: dict[str, dict[str, Any]] = {}
-    for entry in entries:
-        if entry.split == "train":
-            at = found.setdefault(entry.source, {"count": 0, "licences": {}})
-            at["count"] += 1
-            at["licences"][entry.licence] = at["licences"].get(entry.licence, 0) + 1
-    return found
-
-
-def environment(workers: Workers) -> dict[str, Any]:
-    """Versions, device and git commit that a result comes from."""
-    return {
-        "versions": {
-            "python": platform.python_version(),
-            "nrdf": importlib.metadata.version("nrdf"),
-            "torch": torch.__version__,
-        },
-        "device": torch.cuda.get_device_name(workers.device)
-        if workers.device.type == "cuda"
-        else f"cpu, {torch.get_num_threads()} threads",
-        "processes": workers.world,
-        "commit": git_commit(),
-    }
-
-
-def git_commit() -> str | None:
-    """The commit of the checkout that this code runs from; None outside of one."""
-    try:
-        answer = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return answer.stdout.strip()
 
 
 def _to(state: dict[str, Tensor], device: torch.device | None) -> dict[str, Tensor]:

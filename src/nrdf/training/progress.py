@@ -12,6 +12,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from nrdf.errors import OutputError
+
 log = logging.getLogger(__name__)
 
 
@@ -24,10 +26,10 @@ class Display:
         self._started, self._first = time.monotonic(), done
         self._bar: Progress | None = None
         self._board: Any = None
-        self._lines: Any = None
         if not active:
             return
-        self._lines = (run / "metrics.jsonl").open("a", encoding="utf-8")
+        self._run = run
+        self._append("")  # fails now rather than after the first steps
         self._board = _tensorboard(run / "tensorboard", done)
         console = Console(stderr=True)
         if console.is_terminal:
@@ -56,8 +58,6 @@ class Display:
             self._bar.stop()
         if self._board:
             self._board.close()
-        if self._lines:
-            self._lines.close()
 
     def report(self, stage: str, step: int, values: dict[str, float]) -> None:
         """Show scalars (losses, rates, validation figures) of step `step` of all steps."""
@@ -66,8 +66,7 @@ class Display:
         seconds = time.monotonic() - self._started
         each = seconds / max(1, step - self._first)
         left = each * (self._total - step)
-        self._lines.write(json.dumps({"step": step, "stage": stage, **values}) + "\n")
-        self._lines.flush()
+        self._append(json.dumps({"step": step, "stage": stage, **values}) + "\n")
         if self._board:
             for name, value in values.items():
                 self._board.add_scalar(name, value, step)
@@ -84,6 +83,17 @@ class Display:
                 each,
                 f"{left / 60:.0f} min" if left > 90 else f"{left:.0f} s",
             )
+
+    def _append(self, text: str) -> None:
+        path = self._run / "metrics.jsonl"
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as error:
+            raise OutputError(
+                f"cannot write {path}: {error.strerror}; free some space or allow writing, then "
+                "start the same command again: it goes on from its last checkpoint"
+            ) from None
 
 
 def _tensorboard(folder: Path, step: int) -> Any:
