@@ -1,0 +1,250 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from nrdf import cli
+from nrdf.bundled import bundled_chair
+from nrdf.cloud import PointCloud, read_cloud, write_cloud
+from nrdf.ply import read_header, read_scalars
+
+VERBS = sorted(cli.verbs())
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """A reference and two of its regions in metres; a target in millimetres, far away."""
+    folder = tmp_path_factory.mktemp("files")
+    reference, regions = bundled_chair("reference")
+    target, _ = bundled_chair("armchair")
+    write_cloud(folder / "reference.ply", reference)
+    write_cloud(folder / "seat.ply", reference.select(regions["seat"]))
+    np.savez(folder / "masks.npz", legs=regions["legs"])
+    moved = PointCloud(1000 * target.points + [5000.0, -300.0, 20.0], unit="mm", frame="cell")
+    write_cloud(folder / "target.ply", moved)
+    return folder
+
+
+@pytest.fixture
+def retrieve(files, untrained, tmp_path):
+    """Run `nrdf retrieve` into tmp_path/deep/result with some options changed."""
+
+    def run(**changes):
+        options = {
+            "model": [untrained],
+            "reference": [files / "reference.ply"],
+            "region": [files / "seat.ply", files / "masks.npz"],
+            "target": [files / "target.ply"],
+            "out": [tmp_path / "deep" / "result"],
+            **changes,
+        }
+        words = ["retrieve"]
+        for name, values in options.items():
+            words += [f"--{name}", *map(str, values)]
+        return cli.run(words)
+
+    return run
+
+
+def test_help_lists_every_verb_and_imports_nothing_heavy():
+    code = (
+        "import sys; from nrdf import cli; assert cli.run(['--help']) == 0; "
+        "print([m for m in ('torch', 'scipy', 'matplotlib', 'numpy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "[]"
+    for verb in VERBS:
+        assert any(line.startswith(f"  {verb} ") for line in lines)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_with_an_example(verb, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.run([verb, "--help"])
+    assert ended.value.code == 0
+    assert f"Example: nrdf {verb}" in capsys.readouterr().out
+
+
+def test_version(capsys):
+    import nrdf
+
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"nrdf {nrdf.__version__}\n"
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_retrieve_answers_in_the_targets_own_coordinates(retrieve, files, tmp_path, method):
+    assert retrieve(method=[method]) == 0
+    out = tmp_path / "deep" / "result"
+    report = json.loads((out / "report.json").read_text())
+    assert {p.name for p in out.iterdir()} == set(report["files"])
+    assert set(report["files"]) == {"seat.ply", "legs.ply", "picture.png", "report.json"}
+    assert report["method"] == method
+    assert report["model"]["preset"] == "default"
+    assert report["target"]["unit"] == "mm" and report["reference"]["unit"] == "m"
+    assert {"normals", "embed", "map", "associate"} <= set(report["seconds"]["of the target"])
+    target = read_cloud(files / "target.ply")
+    for name in ("seat", "legs"):
+        found = read_cloud(out / f"{name}.ply")
+        columns = read_scalars(out / f"{name}.ply", read_header(out / f"{name}.ply"))
+        assert len(found) == report["regions"][name]["points"] > 0
+        np.testing.assert_allclose(found.points, target.points[columns["index"].astype(int)])
+        assert (columns["confidence"] >= 0).all() and (columns["confidence"] <= 1).all()
+        assert columns["confidence"].mean() == pytest.approx(
+            report["regions"][name]["mean_confidence"], abs=1e-3
+        )
+        assert {"red", "green", "blue"} <= set(columns)
+        assert (found.unit, found.frame) == ("mm", "cell")
+
+
+def test_full_folder_is_refused_before_anything_is_computed(retrieve, tmp_path, capsys):
+    out = tmp_path / "deep" / "result"
+    out.mkdir(parents=True)
+    (out / "mine.txt").write_text("mine")
+    assert retrieve(model=["no-such-model"]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert cli.run(["demo", "--out", str(out)]) == 2
+
+
+def test_overwrite_keeps_what_is_not_ours(retrieve, tmp_path):
+    out = tmp_path / "deep" / "result"
+    out.mkdir(parents=True)
+    (out / "mine.txt").write_text("mine")
+    assert retrieve(overwrite=[]) == 0
+    assert (out / "mine.txt").exists() and (out / "seat.ply").exists()
+
+
+def bad_regions(files):
+    reference, _ = bundled_chair("reference")
+    np.save(files / "far.npy", reference.points[:50] + [1.0, 0.0, 0.0])
+    np.save(files / "empty.npy", np.zeros(8192, bool))
+    np.save(files / "short.npy", np.ones(77, bool))
+    np.savez(files / "evil.npz", **{"../../evil": np.ones(8192, bool)})
+    (files / "text.npy").write_text("no array")
+    (files / "void.ply").write_text("")
+    return {
+        "far.npy": "not on the reference",
+        "empty.npy": "False everywhere",
+        "short.npy": "8192 points",
+        "evil.npz": "no name for a region",
+        "text.npy": "cannot read the region file",
+        "void.ply": "empty",
+        "missing.ply": "missing.ply",
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["far.npy", "empty.npy", "short.npy", "evil.npz", "text.npy", "void.ply", "missing.ply"],
+)
+def test_bad_region_is_named_and_nothing_is_left_behind(retrieve, files, tmp_path, capsys, name):
+    message = bad_regions(files)[name]
+    assert retrieve(region=[files / "seat.ply", files / name]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert message in said
+    assert "Traceback" not in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_two_regions_of_one_name_are_refused(retrieve, files, capsys):
+    assert retrieve(region=[files / "seat.ply", files / "seat.ply"]) == 2
+    assert "two regions are called 'seat'" in capsys.readouterr().err
+
+
+def test_unknown_model_lists_the_known(retrieve, tmp_path, capsys):
+    from nrdf.field.zoo import list_models
+
+    assert retrieve(model=["chiar"]) == 2
+    said = capsys.readouterr().err
+    assert "no model 'chiar'; known: " in said
+    assert all(entry.name in said for entry in list_models())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_ends_with_130_and_leaves_nothing(retrieve, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("nrdf.picture.draw_regions", interrupted)
+    assert retrieve() == 130
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_real_ctrl_c_ends_with_130_and_leaves_nothing(untrained, tmp_path):
+    command = [sys.executable, "-m", "nrdf.cli", "demo", "--model", str(untrained)]
+    process = subprocess.Popen(
+        [*command, "--out", str(tmp_path / "demo")], stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 60
+    while not any(tmp_path.glob(".demo.*/*.ply")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert (process.returncode, "Traceback" in said) == (130, False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unexpected_errors_keep_their_traceback(retrieve, tmp_path, monkeypatch):
+    def broken(*arguments):
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr("nrdf.picture.draw_regions", broken)
+    with pytest.raises(ZeroDivisionError):
+        retrieve()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_demo_compares_with_the_truth(untrained, tmp_path):
+    out = tmp_path / "demo"
+    assert cli.run(["demo", "--model", str(untrained), "--out", str(out)]) == 0
+    report = json.loads((out / "report.json").read_text())
+    rows = report["found"]
+    assert len(rows) == 15
+    for row in rows:
+        _, truth = bundled_chair(row["chair"])
+        found = read_cloud(out / row["chair"] / f"{row['region']}.ply") if row["found"] else ()
+        assert (len(found), int(truth[row["region"]].sum())) == (row["found"], row["true"])
+        assert 0 <= row["iou"] <= 1
+    assert max(row["iou"] for row in rows) > 0.3
+    assert (out / "picture.png").stat().st_size > 50_000
+    # What the demo suggests to try next works.
+    result = tmp_path / "result"
+    words = f"retrieve --model {untrained} --reference {out}/reference.ply --region "
+    words += f"{out}/reference/seat.ply --target {out}/rocker.ply --out {result}"
+    assert cli.run(words.split()) == 0
+    seat = next(row for row in rows if (row["chair"], row["region"]) == ("rocker", "seat"))
+    again = json.loads((result / "report.json").read_text())["regions"]["seat"]
+    assert again["points"] == seat["found"]
+
+
+def test_info_as_json(capsys):
+    assert cli.run(["info", "--as-json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert {"python", "nrdf", "torch"} <= set(said["versions"])
+    assert "cpu" in said["devices"]
+    assert cli.run(["info"]) == 0
+
+
+def test_zoo_add_parses_scores(untrained, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("nrdf.field.zoo.add_to_zoo.__defaults__", (None, None, "", tmp_path))
+    words = ["zoo", "add", str(untrained), "--name", "mine", "--scores", "a=0.5", "b=2"]
+    assert cli.run(words) == 0
+    index = json.loads((tmp_path / "index.json").read_text())
+    assert index["models"]["mine"]["scores"] == {"own": 0.5, "a": 0.5, "b": 2.0}
+    assert cli.run([*words[:-1], "b"]) == 2
+    assert "name=value" in capsys.readouterr().err
+
+
+def test_verbose_works_anywhere(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["info", "-v", "--as-json"])
+    assert ended.value.code == 0
