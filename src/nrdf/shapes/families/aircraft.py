@@ -307,24 +307,28 @@ class Aircraft:
         if not chance(rng, 0.6 if light else 0.18) or st.fuselage == "pod":
             return
         size = rng.uniform(0.018, 0.027) if st.span > 1.1 else rng.uniform(0.012, 0.018)
-        main_x = 1 - st.edge - rng.uniform(0.45, 0.7) * st.chord
-        height, width, axis = self.fuselage.at(main_x)
-        ground = axis - height - rng.uniform(1.6, 3.0) * size
-        z = max(rng.uniform(0.05, 0.12), 0.8 * width)
-        on_wing = st.mount < -0.2
-        top = (
-            main_x,
-            self.wing_at[1] if on_wing else axis - 0.6 * height,
-            z if on_wing else 0.5 * width,
-        )
+        z, back = rng.uniform(0.05, 0.12), rng.uniform(0.35, 0.6)
+        if st.mount < -0.2:  # legs below the wing
+            z = max(z, 0.8 * self.fuselage.at(1 - st.edge)[1])
+            eta = z / self.wing.reach
+            edge, y, _ = self._wing_point(eta)
+            x = edge - back * self.wing.at(eta)[3]
+            height, _, axis = self.fuselage.at(x)
+            top = x, y, z
+        else:
+            x = 1 - st.edge - back * st.chord
+            height, width, axis = self.fuselage.at(x)
+            z = max(z, 0.8 * width)
+            top = x, axis - 0.6 * height, 0.5 * width
+        foot = x, axis - height - rng.uniform(1.6, 3.0) * size, z
         half = 0.007, 0.01
-        self.parts += af.both(bar("gear-leg-right", 1, (main_x, ground, z), top, half, 2.0))
-        self.parts += af.both(af.wheel("gear-wheel-right", (main_x, ground, z), size, 0.4 * size))
+        self.parts += af.both(bar("gear-leg-right", 1, foot, top, half, 2.0))
+        self.parts += af.both(af.wheel("gear-wheel-right", foot, size, 0.4 * size))
         if st.kind == "warbird" or (light and chance(rng, 0.2)):
             return
         x = 1 - rng.uniform(0.1, 0.16)
         h, _, axis = self.fuselage.at(x)
         self.parts.append(
-            bar("gear-leg-nose", 1, (x, ground, 0), (x, axis - 0.5 * h, 0), half, 2.0)
+            bar("gear-leg-nose", 1, (x, foot[1], 0), (x, axis - 0.5 * h, 0), half, 2.0)
         )
-        self.parts.append(af.wheel("gear-wheel-nose", (x, ground, 0), 0.85 * size, 0.35 * size))
+        self.parts.append(af.wheel("gear-wheel-nose", (x, foot[1], 0), 0.85 * size, 0.35 * size))
