@@ -16,6 +16,7 @@ import numpy as np
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
 from nrdf.shapes.dataset import IndexRow, Shape, read_stamp, write_index, write_shape
+from nrdf.shapes.synth import occupancy_queries
 
 SURFACE_POINTS = 8192
 QUERIES = 16384
@@ -123,7 +124,7 @@ def prepare_boxes(
     rows = []
     for done, index in enumerate(chosen, 1):
         name = f"boxes-{index:05d}"
-        if read_stamp(out / f"{name}.npz") != stamp:
+        if (read_stamp(out / f"{name}.npz") or "").partition("+")[0] != stamp:
             shape = _shape(name, category, Boxes(*_part(boxes, index, ("center", "axes", "size"))))
             write_shape(out / f"{name}.npz", shape, stamp)
         rows.append(IndexRow(name, "boxes", "val" if done % 20 == 0 else "train", licence))
@@ -141,15 +142,13 @@ def _part(boxes: dict[str, np.ndarray], index: int, keys: tuple[str, ...]) -> li
 def _shape(name: str, category: str, solid: Boxes) -> Shape:
     rng = np.random.default_rng(list(name.encode()))
     points, normals = solid.sample_surface(SURFACE_POINTS, rng)
-    uniform = rng.uniform(-0.55, 0.55, (QUERIES // 2, 3))
-    near = points[rng.integers(0, len(points), QUERIES - QUERIES // 2)]
-    queries = np.concatenate([uniform, near + rng.normal(0, 0.02, near.shape)])
+    queries = occupancy_queries(points, QUERIES, rng)
     return Shape(
         name=name,
         category=category,
         source="boxes",
         surface_points=points,
         surface_normals=normals,
-        query_points=queries.astype(np.float16),
-        query_occupancies=solid.occupancy(queries.astype(np.float16).astype(np.float64)),
+        query_points=queries,
+        query_occupancies=solid.occupancy(queries.astype(np.float64)),
     )

@@ -1,0 +1,113 @@
+"""Training shapes from the parametric families, with exact occupancy and correspondences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from nrdf.errors import DataError
+from nrdf.shapes.dataset import Correspondence, IndexRow, Shape, read_stamp, write_index, write_shape
+from nrdf.shapes.families import SurfaceCoordinates, get_family
+
+SURFACE_POINTS = 8192
+QUERIES = 16384
+CORRESPONDENCES = 4096
+PADDING = 0.1
+"""Share of the longest side by which the box of uniform queries is larger."""
+NEAR = 0.02
+"""Canonical standard deviation of the queries near the surface."""
+VALIDATION_EVERY = 20
+
+
+def synthesise(
+    category: str,
+    count: int,
+    out: Path,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Write `count` members of a family as training shapes into the folder `out`.
+
+    Member i is made of the seed `seed + i`, so a larger run goes on from a smaller one; members
+    that are there already are kept. Every 20th is for validation. `progress` is told (done, count).
+    Returns how many were written now. Raises DataError for a count below 1.
+    """
+    if count < 1:
+        raise DataError(f"{count} shapes asked for; give at least 1")
+    get_family(category)  # an unknown name is an error before anything is made
+    out.mkdir(parents=True, exist_ok=True)
+    seeds = range(seed, seed + count)
+    stamp = f"family/1 {category} {SURFACE_POINTS} {QUERIES} {CORRESPONDENCES}"
+    todo = [
+        s
+        for s in seeds
+        if (read_stamp(out / f"{_name(category, s)}.npz") or "").partition("+")[0] != stamp
+    ]
+    make = partial(_write_member, category, out, stamp)
+    with get_context("spawn").Pool(workers) as pool:
+        for done, _ in enumerate(pool.imap_unordered(make, todo, chunksize=4), 1):
+            if progress is not None:
+                progress(done, len(todo))
+    write_index(
+        out,
+        [
+            IndexRow(
+                _name(category, s), "family", "train" if (s + 1) % VALIDATION_EVERY else "val", "MIT"
+            )
+            for s in seeds
+        ],
+    )
+    return len(todo)
+
+
+def member_shape(category: str, seed: int) -> Shape:
+    """The training shape of one member, with the group `family-<category>`."""
+    family = get_family(category)
+    member = family.member(seed)
+    rng = np.random.default_rng([seed, 1])
+    surface = member.sample_surface(SURFACE_POINTS, rng)
+    places = member.locate(_canonical_coordinates(category))
+    queries = occupancy_queries(surface.points, QUERIES, rng)
+    return Shape(
+        name=_name(category, seed),
+        category=category,
+        source="family",
+        surface_points=surface.points,
+        surface_normals=surface.normals,
+        query_points=queries,
+        query_occupancies=member.occupancy(queries.astype(np.float64)),
+        correspondences={
+            f"family-{category}": Correspondence(
+                np.nan_to_num(places.points),
+                np.nan_to_num(places.normals),
+                places.exists.astype(np.float32),
+            )
+        },
+    )
+
+
+@lru_cache
+def _canonical_coordinates(category: str) -> SurfaceCoordinates:
+    return get_family(category).canonical_coordinates(CORRESPONDENCES, np.random.default_rng(0))
+
+
+def occupancy_queries(surface: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Queries (count, 3) float16 of a canonical surface (n, 3): half uniform in the padded unit
+    box, half near the surface."""
+    uniform = rng.uniform(-0.5 * (1 + PADDING), 0.5 * (1 + PADDING), (count // 2, 3))
+    near = surface[rng.integers(0, len(surface), count - count // 2)]
+    near = near + rng.normal(0, NEAR, near.shape)
+    return np.concatenate([uniform, near]).astype(np.float16)
+
+
+def _name(category: str, seed: int) -> str:
+    return f"family-{category}-{seed:06d}"
+
+
+def _write_member(category: str, out: Path, stamp: str, seed: int) -> None:
+    write_shape(out / f"{_name(category, seed)}.npz", member_shape(category, seed), stamp)
