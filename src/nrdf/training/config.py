@@ -54,7 +54,7 @@ class DataConfig(Strict):
     pools: dict[str, float] = {}
     """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
     within a pool. Empty: one pool of all shapes."""
-    exact_groups: list[str] = ["family-*", "gsnet"]
+    exact_groups: list[str] = ["family-*", "shared-*"]
     """Patterns of correspondence groups whose weight 0 is a fact ("no such place"), not a doubt."""
     weight_threshold: float = Field(default=0.05, ge=0, le=1)
     """Correspondences of less confidence are not drawn."""
