@@ -124,7 +124,7 @@ def test_overwrite_keeps_what_is_not_ours(retrieve, tmp_path):
 
 def bad_regions(files):
     reference, _ = bundled_chair("reference")
-    np.save(files / "far.npy", reference.points[:50] + [1.0, 0.0, 0.0])
+    np.save(files / "far.npy", reference.points[:50] + np.array([1.0, 0.0, 0.0]))
     np.save(files / "empty.npy", np.zeros(8192, bool))
     np.save(files / "short.npy", np.ones(77, bool))
     np.savez(files / "evil.npz", **{"../../evil": np.ones(8192, bool)})

@@ -44,7 +44,7 @@ def test_empty_folder_is_used_and_a_full_one_refused(tmp_path):
         (folder / "x.txt").write_text("1")
     assert (tmp_path / "empty" / "x.txt").exists()
     with (
-        pytest.raises(OutputError, match="not empty.*--overwrite"),
+        pytest.raises(OutputError, match=r"not empty.*--overwrite"),
         output_folder(tmp_path / "result"),
     ):
         pytest.fail("the block must not run")

@@ -1,4 +1,4 @@
-"""Neural Reparameterised Descriptor Fields: teach a region once, find it on every such object.
+"""Neural Region Descriptor Fields: teach a region once, find it on every such object.
 
     model = nrdf.load_model("chair")
     taught = model.set_reference(nrdf.read_cloud("reference.ply"))

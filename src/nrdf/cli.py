@@ -21,13 +21,15 @@ Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
 Ends with 0, with 2 for bad input (the message says what to do), with 130 after Ctrl-C."""
 
+RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train")
+
 
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
     from nrdf.commands.evaluate import bench, evaluate
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
-    from nrdf.commands.shapes import correspond, synth
+    from nrdf.commands.shapes import boxes, correspond, synth
     from nrdf.commands.show import demo
     from nrdf.commands.train import train
 
@@ -36,6 +38,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "demo": demo,
         "info": info,
         "synth": synth,
+        "boxes": boxes,
         "correspond": correspond,
         "train": train,
         "zoo": zoo,
@@ -75,7 +78,8 @@ def run(given: list[str], verbose: bool = False) -> int:
         _complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        _complain("interrupted; nothing half-written was left behind")
+        goes_on = "; the same command goes on where it was" if given[0] in RESUMABLE else ""
+        _complain(f"interrupted{goes_on}")
         return 130
     except BrokenPipeError:
         # The reader of our output has gone (`nrdf info | head`): nothing more to say.
