@@ -8,33 +8,41 @@ from typing import TYPE_CHECKING, Literal
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, errors, progress_bar, table, versions
+from nrdf.errors import DataError
 
 if TYPE_CHECKING:
     from nrdf.benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
+    from nrdf.regions.model import Model
 
 
 def evaluate(
-    benchmark: Positional[Literal["bsrc"]],
-    data: Path,
+    benchmark: Positional[Literal["bsrc", "families"]],
     category: str,
-    out: Path,
+    data: Path | None = None,
+    out: Path | None = None,
     method: tuple[str, ...] = ("nrdf", "nrdf-points", "copy", "box"),
     model: str | None = None,
     labels: Literal["published", "corrected"] = "published",
+    pairs: int = 50,
     device: str = "cpu",
 ) -> None:
-    """Score methods of retrieval on the Benchmark for Surface Region Correspondence (Table II).
+    """Score retrieval on real scans (bsrc), or correspondences against exact truth (families).
 
-    CD-L1 in the paper's convention: for every point the Manhattan distance to its nearest
-    neighbour in the other set, averaged, summed over both directions. Lower is better.
+    bsrc: Table II of the paper on the Benchmark for Surface Region Correspondence. CD-L1 in the
+    paper's convention: for every point the Manhattan distance to its nearest neighbour in the
+    other set, averaged, summed over both directions. Lower is better.
+
+    families: mean distance of C's prediction from the exact corresponding point, on pairs of
+    parametric shapes that no training set holds, beside that of a bounding-box copy.
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
     Args:
-        benchmark: bsrc.
-        data: The benchmark's folder, with Chair, Car and plane in it.
+        benchmark: bsrc or families.
         category: chair, car or plane.
-        out: Folder for the table (Markdown) and every pair's figures (JSON).
+        data: BSRC's folder, with Chair, Car and plane in it.
+        out: Folder for the table (Markdown) and every pair's figures (JSON) of bsrc.
+        pairs: Pairs of members for families.
         method: nrdf, nrdf-points, copy, box, copy-normals, box-normals, registration.
         model: Zoo name, weight file or run; the category's model in the zoo unless given.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
@@ -47,6 +55,11 @@ def evaluate(
     from nrdf.benchmark.evaluate import write_results
     from nrdf.benchmark.methods import get_method
 
+    if benchmark == "families":
+        _evaluate_family(nrdf.load_model(model or category, device), category, pairs)
+        return
+    if data is None:
+        raise DataError("bsrc needs its folder, with Chair, Car and plane in it: --data bsrc/")
     objects = read_bsrc(data, category, labels)
     learned = any(name.startswith("nrdf") for name in method)
     loaded = nrdf.load_model(model or category, device) if learned else None
@@ -55,8 +68,26 @@ def evaluate(
     for name, find in methods.items():
         with progress_bar(name) as progress:
             results.append(run(name, find, objects, category, progress))
-    write_results(results, category, labels, out)
+    if out is not None:
+        write_results(results, category, labels, out)
     console.print(markdown(results, category), soft_wrap=True, markup=False)
+
+
+def _evaluate_family(model: Model, category: str, pairs: int) -> None:
+    import numpy as np
+
+    from nrdf.benchmark.family import evaluate_family
+
+    with progress_bar(f"pairs of {category}s") as progress:
+        found = evaluate_family(model, category, pairs, progress)
+    shown = table("", f"{pairs} pairs, {category}", "mean error", "median pair", "worst pair")
+    for name, error in (("C", found.field), ("bounding-box copy", found.box)):
+        shown.add_row(name, *(f"{f(error):.4f}" for f in (np.mean, np.median, np.max)))
+    console.print(shown)
+    console.print(
+        f"C is {found.ratio:.1f} times closer; lengths are shares of the longest side. "
+        f"{found.shared.mean():.0%} of a reference's surface exists on its target."
+    )
 
 
 def bench(

@@ -38,9 +38,35 @@ def synth(
     console.print(f"{made} shapes made, {count - made} were there already, in {out}")
 
 
+def boxes(
+    file: Positional[Path], category: str, count: int, out: Path, seed: int = 0, licence: str = ""
+) -> None:
+    """Make training shapes of objects that are given as oriented boxes (PartNet's part boxes).
+
+    Real proportions and structure, no curved detail. Objects whose boxes hold mostly air are left
+    out. Started again, it goes on where it was.
+
+    Example: nrdf boxes chair_boxes.npz --category chair --count 400 --out data/chair-boxes
+
+    Args:
+        file: .npz with center, axes, size, label and offset.
+        category: What the objects are.
+        count: Number of shapes, drawn by the seed; every 20th is for validation.
+        out: Data folder to write or to go on with.
+        seed: Seed of the draw.
+        licence: Terms of the boxes, kept with the shapes and the weights trained on them.
+    """
+    from nrdf.shapes.boxes import prepare_boxes
+
+    with progress_bar("boxed shapes") as progress:
+        made = prepare_boxes(file, out, category, count, seed, licence, progress)
+    console.print(f"{made} shapes in {out}")
+
+
 def correspond(
     data: Positional[tuple[Path, ...]],
     templates: int = 12,
+    meshes: Path | None = None,
     workers: int | None = None,
 ) -> None:
     """Add dense correspondences between all shapes of data folders, by registering templates.
@@ -53,10 +79,16 @@ def correspond(
     Args:
         data: Data folders of one category (of `nrdf prepare` or `nrdf synth`).
         templates: Number of shapes that serve as templates.
+        meshes: Folder of the meshes that the first data folder was prepared from: those that share
+            their triangulation get exact correspondences too, vertex by vertex.
         workers: Processes; all cores unless given.
     """
     from nrdf.shapes.correspond import correspond_folders
+    from nrdf.shapes.topology import add_shared_topology
 
+    if meshes is not None:
+        for name, shapes in add_shared_topology(meshes.iterdir(), data[0]).items():
+            console.print(f"{len(shapes)} shapes share their triangulation: group {name}")
     with progress_bar("shapes registered") as progress:
         report = correspond_folders(list(data), templates, _cores(workers), progress=progress)
     console.print(

@@ -56,7 +56,9 @@ def _mean_areas(found: list[tuple[str, trimesh.Trimesh]]) -> np.ndarray:
     return area / area.sum()
 
 
-def _add(path: Path, name: str, mesh: trimesh.Trimesh, face: np.ndarray, corner: np.ndarray) -> None:
+def _add(
+    path: Path, name: str, mesh: trimesh.Trimesh, face: np.ndarray, corner: np.ndarray
+) -> None:
     shape = read_shape(path)
     if name in shape.correspondences:
         return
