@@ -1,20 +1,19 @@
-"""The class that users need: teach a reference once, find its regions on every new object.
+"""The classes that users need: teach a reference once, find its regions on every new object.
 
-    model = nrdf.load_model("chair")
-    taught = model.set_reference(reference)
-    match = taught.retrieve(region, target)
+A `Model` embeds clouds; a `Taught` is one reference with its descriptors, and retrieves regions.
 """
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
@@ -23,13 +22,13 @@ from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
 from nrdf.regions.region import region_indices
 
-log = logging.getLogger(__name__)
-
 METHODS = ("mask", "points")
 WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
-_CHUNK = 8192
+_CHUNK = 8192  # points described or inverted at a time
+_DISTANCE_SCALE = 0.1  # canonical distance to the mapped point at which trust has fallen to 1/e
+_ERROR_SCALE = 0.05  # the same, of the error that the field expects of itself
 
 
 @dataclass(frozen=True)
@@ -58,21 +57,26 @@ class Embedded:
         """Selected working points as indices of the whole cloud, and which working point each
         follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
         """
-        if len(self.working) == len(self.cloud.points):
-            index = np.flatnonzero(selected)
-            return index, index
-        nearest = self._nearest_working()
-        index = np.flatnonzero(selected[nearest])
-        return index, nearest[index]
+        index = np.flatnonzero(selected[self.nearest_working])
+        return index, self.nearest_working[index]
 
-    def _nearest_working(self) -> np.ndarray:
-        from scipy.spatial import cKDTree
+    @property
+    def is_whole(self) -> bool:
+        """Whether every point of the cloud is in use."""
+        return len(self.working) == len(self.cloud.points)
 
-        if "nearest" not in self.__dict__:  # the cloud is large: asked once for all regions
-            points = (self.cloud.points - self.centre) / self.scale
-            nearest = cKDTree(self.points).query(points, workers=-1)[1]
-            object.__setattr__(self, "nearest", nearest)
-        return self.__dict__["nearest"]
+    @cached_property
+    def nearest_working(self) -> np.ndarray:
+        """The position in `working` of the point nearest to each point of the cloud."""
+        if self.is_whole:
+            return self.working
+        points = (self.cloud.points - self.centre) / self.scale
+        return cKDTree(self.points).query(points, workers=-1)[1]
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The cloud's own points, for regions that are given as points."""
+        return cKDTree(self.cloud.points)
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,15 @@ class Match:
         return float(self.confidence.mean()) if len(self.confidence) else 0.0
 
 
+class Mapped(NamedTuple):
+    """Reference points on a target, canonical: points (m, 3), normals (m, 3), trust (m,) in [0, 1]
+    (that the place exists, and how small an error the field expects)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    trust: np.ndarray
+
+
 class Model:
     """A trained field of one category, ready to be taught references.
 
@@ -112,10 +125,12 @@ class Model:
 
     @property
     def category(self) -> str:
+        """What the model was trained on, such as "chair"; "" if its file does not say."""
         return str(self.metadata.get("category", ""))
 
     @property
     def preset(self) -> str:
+        """Name of the network's preset, such as "default"."""
         return self.field.preset
 
     def __repr__(self) -> str:
@@ -145,7 +160,10 @@ class Model:
         return Embedded(cloud, working, points, normals, centre, scale, z, seconds)
 
     def set_reference(self, reference: PointCloud) -> Taught:
-        """Embed a reference and describe its surface once, for any number of targets."""
+        """Embed a reference and describe its surface once, for any number of targets.
+
+        Raises CloudError as `embed` does.
+        """
         return Taught(self, self.embed(reference))
 
     def _tensor(self, values: np.ndarray) -> torch.Tensor:
@@ -160,9 +178,7 @@ class Taught:
         self.reference = reference
         self._k = self._describe(reference.points, reference.normals)
 
-    def retrieve(
-        self, region: Any, target: PointCloud | Embedded, method: str = "mask"
-    ) -> Match:
+    def retrieve(self, region: Any, target: PointCloud | Embedded, method: str = "mask") -> Match:
         """Find one region on a target: `retrieve_all` for a single region."""
         return self.retrieve_all({"region": region}, target, method)["region"]
 
@@ -176,15 +192,15 @@ class Taught:
         reference points nearest in position and normal; "points" snaps C's prediction of each
         region point to the target (paper, eq. 9).
 
-        Raises RegionError for a region that is empty or not on the reference, or an unknown
-        method.
+        Raises RegionError for a region that is empty or not on the reference (the message names
+        it) or an unknown method, and CloudError for a target as `Model.embed` does.
         """
         if method not in METHODS:
             raise RegionError(unknown_name("method", method, METHODS))
-        chosen = {}
+        reference, chosen = self.reference, {}
         for name, region in regions.items():
             try:
-                chosen[name] = region_indices(region, self.reference.cloud)
+                chosen[name] = region_indices(region, reference.cloud, lambda: reference.tree)
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self.model.embed(target)
@@ -199,14 +215,14 @@ class Taught:
     def map_points(self, indices: np.ndarray, target: Embedded) -> Mapped:
         """Where reference points given by their indices (m,) in the cloud arrive on a target."""
         reference = self.reference
-        if len(reference.working) == len(reference.cloud.points):
+        if reference.is_whole:
             return self._invert(target, self._k[:, indices], reference.normals[indices])
         points = (reference.cloud.points[indices] - reference.centre) / reference.scale
         given = reference.cloud.normals
         normals = (
             given[indices]
             if given is not None
-            else reference.normals[reference._nearest_working()[indices]]
+            else reference.normals[reference.nearest_working[indices]]
         )
         return self._invert(target, self._describe(points, normals), normals)
 
@@ -225,9 +241,11 @@ class Taught:
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
             index, follows = target.to_all(votes > 0.5)
+            whole = self.reference.is_whole
+            arrived = mapped.points[indices] if whole else self.map_points(indices, target).points
             matches[name] = Match(
                 indices=index,
-                points=target.original(self.map_points(indices, target).points),
+                points=target.original(arrived),
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
@@ -259,7 +277,7 @@ class Taught:
         if mask.any():
             return mask
         # The region fell between the points that were kept: its nearest ones stand for it.
-        mask[reference._nearest_working()[indices]] = True
+        mask[reference.nearest_working[indices]] = True
         return mask
 
     def _describe(self, points: np.ndarray, normals: np.ndarray) -> torch.Tensor:
@@ -288,25 +306,7 @@ class Taught:
                         _trust(inverse.existence, inverse.log_error, len(own)),
                     )
                 )
-        return Mapped(*(np.concatenate(column) for column in zip(*map(_fields, parts), strict=True)))
-
-
-@dataclass(frozen=True)
-class Mapped:
-    """Reference points on a target, canonical: points (m, 3), normals (m, 3), trust (m,) in [0, 1]
-    (that the place exists, and how small an error the field expects)."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    trust: np.ndarray
-
-
-_DISTANCE_SCALE = 0.1
-_ERROR_SCALE = 0.05
-
-
-def _fields(mapped: Mapped) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return mapped.points, mapped.normals, mapped.trust
+        return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _trust(

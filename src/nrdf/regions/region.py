@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
@@ -11,18 +13,28 @@ from nrdf.errors import RegionError
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""
+_FORMS = "a region is a boolean mask (n,), integer indices (m,) or points (m, 3) on the reference"
 
 
-def region_indices(region: ArrayLike | PointCloud, reference: PointCloud) -> np.ndarray:
+def region_indices(
+    region: ArrayLike | PointCloud,
+    reference: PointCloud,
+    tree: Callable[[], cKDTree] | None = None,
+) -> np.ndarray:
     """Indices (m,) into `reference.points` of a region, in the region's own order.
 
     region: a boolean mask (n,), integer indices (m,), or points (m, 3) in the reference's frame
     and unit (array or PointCloud), each of which stands for the nearest reference point.
+    tree: gives the tree of the reference's points where one is kept; asked only if needed.
 
-    Raises RegionError for a region that is empty, has the wrong shape, indices out of range, or
-    points farther from the reference than 2 % of its longest side.
+    Raises RegionError for a region that is empty, has the wrong shape, indices out of range,
+    coordinates that are not finite, or points farther from the reference than 2 % of its longest
+    side.
     """
-    values = region.points if isinstance(region, PointCloud) else np.asarray(region)
+    try:
+        values = region.points if isinstance(region, PointCloud) else np.asarray(region)
+    except ValueError as error:  # rows of different lengths
+        raise RegionError(f"the region is no array: {error}; {_FORMS}") from None
     count = len(reference.points)
     if values.size == 0:
         raise RegionError("the region is empty; it needs at least one point of the reference")
@@ -43,19 +55,17 @@ def region_indices(region: ArrayLike | PointCloud, reference: PointCloud) -> np.
                 f"not {values.min()} to {values.max()}"
             )
         return values.astype(np.int64)
-    if values.ndim == 2 and values.shape[1] == 3 and np.issubdtype(values.dtype, np.number):
-        return _nearest_indices(values.astype(np.float64), reference.points)
-    raise RegionError(
-        "a region is a boolean mask (n,), integer indices (m,) or points (m, 3) on the reference, "
-        f"not an array of {values.dtype} of shape {values.shape}"
-    )
+    if values.ndim == 2 and values.shape[1] == 3 and values.dtype.kind in "iuf":
+        found = cKDTree(reference.points) if tree is None else tree()
+        return _nearest_indices(values.astype(np.float64), found)
+    raise RegionError(f"{_FORMS}, not an array of {values.dtype} of shape {values.shape}")
 
 
-def _nearest_indices(points: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def _nearest_indices(points: np.ndarray, reference: cKDTree) -> np.ndarray:
     if not np.isfinite(points).all():
         raise RegionError("the region has coordinates that are not finite; remove those points")
-    distance, indices = cKDTree(reference).query(points)
-    extent = float(np.ptp(reference, axis=0).max())
+    distance, indices = reference.query(points)
+    extent = float((reference.maxes - reference.mins).max())
     worst = float(distance.max())
     if worst > ON_REFERENCE * extent:
         off = int((distance > ON_REFERENCE * extent).sum())
