@@ -40,7 +40,8 @@ def read_bsrc(folder: Path, category: str, labels: str = "published") -> list[Be
     """All objects of a category under a BSRC folder, by name.
 
     labels: "published", or "corrected" (with `SWAPPED` put right). Raises DataError for a folder
-    that is no BSRC folder, or an object that lacks a file, naming it.
+    that is no BSRC folder, or an object that lacks a file, naming it; CloudError for a file that
+    cannot be read.
     """
     if category not in FOLDERS:
         raise DataError(unknown_name("BSRC category", category, list(FOLDERS)))
@@ -48,21 +49,21 @@ def read_bsrc(folder: Path, category: str, labels: str = "published") -> list[Be
         raise DataError(unknown_name("reading of the labels", labels, ["published", "corrected"]))
     root = Path(folder) / FOLDERS[category]
     if not root.is_dir():
-        raise DataError(f"no BSRC objects in {root}; expected folders such as {root}/{category}1")
+        raise DataError(
+            f"no BSRC objects in {root}; expected folders such as {root / category}1 (give the "
+            f"folder that holds {', '.join(FOLDERS.values())})"
+        )
     objects = []
     for place in sorted(path for path in root.iterdir() if path.is_dir()):
         swaps = SWAPPED.get((category, place.name), {}) if labels == "corrected" else {}
-        regions = {}
-        for roi in ROIS[category]:
-            path = place / f"cropped_{swaps.get(roi, roi)}.ply"
-            if not path.is_file():
-                raise DataError(f"{place} lacks its region {roi}: expected {path}")
-            regions[roi] = read_cloud(path).points
-        cloud = read_cloud(place / "obj_pcd.ply")
-        normals = estimate_normals(cloud.points)
-        objects.append(
-            BenchmarkObject(place.name, PointCloud(points=cloud.points, normals=normals), regions)
-        )
+        files = {roi: place / f"cropped_{swaps.get(roi, roi)}.ply" for roi in ROIS[category]}
+        for file in (place / "obj_pcd.ply", *files.values()):
+            if not file.is_file():
+                raise DataError(f"the BSRC object {place.name} is not complete: no file {file}")
+        regions = {roi: read_cloud(file).points for roi, file in files.items()}
+        points = read_cloud(place / "obj_pcd.ply").points
+        cloud = PointCloud(points, estimate_normals(points))
+        objects.append(BenchmarkObject(place.name, cloud, regions))
     if len(objects) < 2:
         raise DataError(f"{root} holds {len(objects)} objects; a pair needs at least two")
     return objects

@@ -13,6 +13,8 @@ import numpy as np
 from nrdf.benchmark.bsrc import ROIS, BenchmarkObject, ordered_pairs
 from nrdf.benchmark.methods import DESCRIPTIONS, Method
 from nrdf.benchmark.metrics import chamfer_l1
+from nrdf.errors import OutputError
+from nrdf.ply import write_atomically
 
 MISSED = 1.0
 """CD-L1 that a region found nowhere is counted with: about the object's own length."""
@@ -40,6 +42,7 @@ class MethodResult:
 
     @property
     def mean(self) -> float:
+        """Mean CD-L1 over all pairs and regions."""
         return float(self.distance.mean())
 
 
@@ -50,7 +53,10 @@ def evaluate(
     category: str,
     progress: Callable[[int, int], None] | None = None,
 ) -> MethodResult:
-    """Run one method on all ordered pairs. `progress` is told (done, all)."""
+    """Run one method on all ordered pairs. `progress` is told (done, all).
+
+    A region that is found nowhere counts as `MISSED`.
+    """
     pairs = ordered_pairs(objects)
     rois = ROIS[category]
     distance = np.full((len(pairs), len(rois)), MISSED)
@@ -83,19 +89,24 @@ def table(results: Sequence[MethodResult], category: str) -> str:
             f"| {np.median(result.seconds):.2f} |"
         )
     for name, mean in PUBLISHED[category].items():
-        lines.append(
-            f"| published {name} (all 90 pairs) | {'| ' * len(rois)}| {mean:.3f} | |"
-        )
+        lines.append(f"| published {name} (all 90 pairs) | {'| ' * len(rois)}| {mean:.3f} | |")
     return "\n".join(lines)
 
 
 def write_results(
     results: Sequence[MethodResult], category: str, labels: str, folder: Path
 ) -> None:
-    """Write `table2-<category>-<labels>.md` and `.json` (every pair's figures) into `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write `table2-<category>-<labels>.md` and `.json` (every pair's figures) into `folder`.
+
+    Raises OutputError if the folder cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
     stem = folder / f"table2-{category}-{labels}"
-    stem.with_suffix(".md").write_text(table(results, category) + "\n", encoding="utf-8")
+    markdown = table(results, category) + "\n"
+    write_atomically(stem.with_suffix(".md"), [markdown.encode("utf-8")])
     content = {
         "category": category,
         "labels": labels,
@@ -120,4 +131,4 @@ def write_results(
             for result in results
         },
     }
-    stem.with_suffix(".json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_atomically(stem.with_suffix(".json"), [json.dumps(content, indent=1).encode("utf-8")])

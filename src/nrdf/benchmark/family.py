@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.cloud import PointCloud
+from nrdf.errors import DataError
 from nrdf.regions.model import Model
 from nrdf.shapes.families import get_family
 
@@ -45,8 +46,11 @@ def evaluate_family(
     """Ask C for exact correspondences of `pairs` pairs of unseen members.
 
     Each reference is a cloud of its own surface, its normals known; places that the target lacks
-    ("none") are left out of the error.
+    ("none") are left out of the error. `progress` is told (done, all). Raises DataError for a
+    category without a family, or no pairs.
     """
+    if pairs < 1:
+        raise DataError(f"{pairs} pairs asked for; give at least 1")
     family = get_family(category)
     rows = []
     for number in range(pairs):

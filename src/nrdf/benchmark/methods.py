@@ -1,10 +1,16 @@
-"""Every way of finding regions, behind one call: `method(reference, target) -> name to indices`."""
+"""Every way of finding regions, behind one call: `method(reference, target) -> name to indices`.
+
+Indices are those of target points. A method that moves the region's own points gives the target
+point that each of them is snapped to, in their order, so a target point may occur several times and
+counts as often in CD-L1; one that finds a mask gives every point of it once.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nrdf.benchmark.bsrc import BenchmarkObject
 from nrdf.errors import ConfigError, unknown_name
@@ -52,7 +58,7 @@ def get_method(name: str, model: Model | None = None) -> Method:
 
 
 class _FieldMethod:
-    """The product itself, each object embedded once for all its pairs."""
+    """The field, each object embedded once for all its pairs."""
 
     def __init__(self, model: Model, association: str) -> None:
         self.model, self.association = model, association
@@ -67,7 +73,10 @@ class _FieldMethod:
         matches = self.taught[reference.name].retrieve_all(
             reference.regions, self.embedded[target.name], self.association
         )
-        return {name: match.indices for name, match in matches.items()}
+        if self.association == "mask":
+            return {name: match.indices for name, match in matches.items()}
+        tree = cKDTree(target.cloud.points)
+        return {name: tree.query(match.points)[1] for name, match in matches.items()}
 
 
 class _Copied:
@@ -86,7 +95,7 @@ class _Copied:
             points, _normals(reference), target.cloud.points, _normals(target), self.weight
         )
         return {
-            name: np.unique(index[region_indices(region, reference.cloud)])
+            name: index[region_indices(region, reference.cloud)]
             for name, region in reference.regions.items()
         }
 
@@ -107,9 +116,7 @@ class _Registration:
         points, normals = _canonical(target)
         sample = np.random.default_rng(1).permutation(len(points))[: 2 * _TEMPLATE_POINTS]
         mapped = template.register(points[sample], normals[sample])
-        asked, _ = voters(
-            mapped.points, template.normals, points, normals, NORMAL_WEIGHT, VOTERS
-        )
+        asked, _ = voters(mapped.points, template.normals, points, normals, NORMAL_WEIGHT, VOTERS)
         found = {}
         for name, region in reference.regions.items():
             member = np.zeros(len(reference.cloud.points), bool)

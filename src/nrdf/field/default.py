@@ -80,9 +80,7 @@ class DefaultField(Field):
 
     def _split(self, z: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         config = self.config
-        latent, extents, planes = z.split(
-            [config.latent, 3, z.shape[1] - config.latent - 3], dim=1
-        )
+        latent, extents, planes = z.split([config.latent, 3, z.shape[1] - config.latent - 3], dim=1)
         cells = config.plane_cells
         return latent, extents, planes.unflatten(1, (3, config.plane_channels, cells, cells))
 
@@ -165,7 +163,7 @@ class Decoder(nn.Module):
 
 
 class InverseDescriptor(nn.Module):
-    """C: displacement from the half-way copy, then one correction by the target's local features."""
+    """C: displacement from the half-way copy, then one correction by the features found there."""
 
     def __init__(self, config: DefaultConfig, descriptor_size: int) -> None:
         super().__init__()

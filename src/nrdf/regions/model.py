@@ -190,7 +190,8 @@ class Taught:
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
         method: "mask" maps the whole reference and lets each target point ask the mapped
         reference points nearest in position and normal; "points" snaps C's prediction of each
-        region point to the target (paper, eq. 9).
+        region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
+        gets no majority anywhere: use "points" for spots.
 
         Raises RegionError for a region that is empty or not on the reference (the message names
         it) or an unknown method, and CloudError for a target as `Model.embed` does.

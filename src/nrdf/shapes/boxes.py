@@ -15,14 +15,20 @@ import numpy as np
 
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
-from nrdf.shapes.dataset import IndexRow, Shape, read_stamp, write_index, write_shape
-from nrdf.shapes.synth import occupancy_queries
+from nrdf.shapes.dataset import IndexRow, Shape, made_by, write_shape
+from nrdf.shapes.synth import (
+    QUERIES,
+    SURFACE_POINTS,
+    VALIDATION_EVERY,
+    add_to_index,
+    make_folder,
+    occupancy_queries,
+)
 
-SURFACE_POINTS = 8192
-QUERIES = 16384
 THICKEST_LEG = 0.15  # a thicker "leg" is a box around a whole base, which is mostly air
-LABELS = {0: "back", 1: "seat", 2: "leg", 3: "arm"}
+BACK, SEAT, LEG = 0, 1, 2  # labels of boxes; 3 is an arm
 _KEYS = ("center", "axes", "size", "label", "offset")
+_UNREADABLE = (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile)
 
 
 class Boxes:
@@ -40,9 +46,7 @@ class Boxes:
         """Whether each point (n, 3) is inside any box, (n,) bool."""
         return self._depth(points).max(axis=1) > 0
 
-    def sample_surface(
-        self, count: int, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def sample_surface(self, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Points (count, 3) and outward normals (count, 3), even over what no other box covers."""
         area = np.stack(
             [self.half[:, 1] * self.half[:, 2], self.half[:, 0] * self.half[:, 2],
@@ -78,24 +82,35 @@ class Boxes:
 
 
 def read_boxes(path: Path) -> dict[str, np.ndarray]:
-    """Arrays of a file of boxed objects. Raises DataError if it is none."""
+    """Arrays of a file of boxed objects. Raises DataError if it is none, saying why."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            boxes = {key: arrays[key] for key in _KEYS}
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            missing = [key for key in _KEYS if key not in arrays]
+            boxes = {key: arrays[key] for key in _KEYS if key in arrays}
+    except FileNotFoundError as error:
+        raise DataError(f"no file {path}; expected .npz with {', '.join(_KEYS)}") from error
+    except _UNREADABLE as error:
         raise DataError(
             f"{path} is no file of boxes ({error}); expected .npz with {', '.join(_KEYS)}"
         ) from error
-    if boxes["offset"][-1] != len(boxes["center"]):
-        raise DataError(f"{path}: offset ends at {boxes['offset'][-1]}, not at the last box")
+    if missing:
+        raise DataError(f"{path} is no file of boxes: it has no {', '.join(missing)}")
+    count, offset = len(boxes["label"]), boxes["offset"]
+    for key, shape in (("center", (3,)), ("axes", (3, 3)), ("size", (3,)), ("label", ())):
+        if boxes[key].shape != (count, *shape):
+            raise DataError(f"{path}: {key} is {boxes[key].shape}, expected {(count, *shape)}")
+    if offset.ndim != 1 or len(offset) < 2 or offset[0] != 0 or (np.diff(offset) < 0).any():
+        raise DataError(f"{path}: offset must rise from 0 to the number of boxes, {count}")
+    if offset[-1] != count:
+        raise DataError(f"{path}: offset ends at {offset[-1]}, not at the last of {count} boxes")
     return boxes
 
 
 def usable(size: np.ndarray, label: np.ndarray) -> bool:
     """Whether boxes make a chair worth learning from: back, seat and at least three slim legs."""
-    legs = size[label == 2]
+    legs = size[label == LEG]
     return (
-        bool((label == 0).any() and (label == 1).any())
+        bool((label == BACK).any() and (label == SEAT).any())
         and len(legs) >= 3
         and bool((legs.min(axis=1) < THICKEST_LEG).all())
     )
@@ -112,25 +127,34 @@ def prepare_boxes(
 ) -> int:
     """Write `count` boxed objects, drawn by `seed`, as training shapes into the folder `out`.
 
-    Those that are there already are kept. `progress` is told (done, count). Returns how many
-    shapes the folder now holds of this file.
+    Those that are there already are kept, and so are shapes from elsewhere that the folder's index
+    lists. Every 20th is for validation. `progress` is told (done, all). Returns how many shapes
+    the folder now holds of this file. Raises DataError for a file that is none of boxes or has no
+    usable object, or a count below 1; OutputError if the folder cannot be written.
     """
+    if count < 1:
+        raise DataError(f"{count} shapes asked for; give at least 1")
     boxes = read_boxes(path)
     offset = boxes["offset"]
     order = np.random.default_rng(seed).permutation(len(offset) - 1)
     chosen = [i for i in order if usable(*_part(boxes, i, ("size", "label")))][:count]
-    out.mkdir(parents=True, exist_ok=True)
+    if not chosen:
+        raise DataError(
+            f"none of the {len(order)} objects in {path} is usable: each needs a back (label "
+            f"{BACK}), a seat ({SEAT}) and three legs ({LEG}) thinner than {THICKEST_LEG}"
+        )
+    make_folder(out)
     stamp = f"boxes/1 {SURFACE_POINTS} {QUERIES}"
     rows = []
     for done, index in enumerate(chosen, 1):
         name = f"boxes-{index:05d}"
-        if (read_stamp(out / f"{name}.npz") or "").partition("+")[0] != stamp:
+        if made_by(out / f"{name}.npz") != stamp:
             shape = _shape(name, category, Boxes(*_part(boxes, index, ("center", "axes", "size"))))
             write_shape(out / f"{name}.npz", shape, stamp)
-        rows.append(IndexRow(name, "boxes", "val" if done % 20 == 0 else "train", licence))
+        rows.append(IndexRow(name, "boxes", "train" if done % VALIDATION_EVERY else "val", licence))
         if progress is not None:
             progress(done, len(chosen))
-    write_index(out, rows)
+    add_to_index(out, rows)
     return len(rows)
 
 

@@ -11,15 +11,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from nrdf.errors import DataError
-from nrdf.shapes.dataset import Correspondence, Shape, read_shape, read_stamp, shape_paths
-from nrdf.shapes.dataset import write_shape
+from nrdf.shapes.dataset import (
+    Correspondence,
+    Shape,
+    read_shape,
+    read_stamp,
+    shape_paths,
+    write_shape,
+)
+from nrdf.shapes.pool import each
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 TEMPLATE_POINTS = 1024
@@ -49,31 +56,45 @@ def correspond_folders(
     """Add the groups `template-*` to every train and val shape of data folders (of one category).
 
     Shapes that have them already, from the same templates and settings, are kept: an interrupted
-    run goes on. `progress` is told (done, all). Raises DataError with fewer shapes than templates.
+    run goes on. `progress` is told (done, all). A worker needs about 70 MB a template. Raises
+    DataError with fewer training shapes than templates, or a shape file that cannot be read.
     """
     settings = settings or RegistrationSettings()
     train = [path for folder in folders for path in shape_paths(folder, "train")]
     if not 1 <= templates <= len(train):
-        raise DataError(f"{templates} templates of {len(train)} training shapes; give 1 to that")
+        where = ", ".join(str(folder) for folder in folders)
+        if not train:
+            raise DataError(f"no training shapes in {where or 'no folder'}: nothing to register")
+        raise DataError(
+            f"{templates} templates cannot be chosen out of the {len(train)} training shapes in "
+            f"{where}; give 1 to {len(train)}"
+        )
     shapes = [read_shape(path) for path in train]
     chosen = choose_templates(shapes, templates)
     names = [shapes[index].name for index in chosen]
     key = hashlib.sha256(repr((names, settings)).encode()).hexdigest()[:12]
     paths = train + [path for folder in folders for path in shape_paths(folder, "val")]
     todo = [path for path in paths if not (read_stamp(path) or "").endswith(f"+{key}")]
-    arguments = [_oriented_sample(shapes[index], TEMPLATE_POINTS) for index in chosen]
+    samples = [_oriented_sample(shapes[index], TEMPLATE_POINTS) for index in chosen]
     del shapes
-    context = get_context("spawn")
-    with context.Pool(workers, _start_worker, (arguments, settings, key)) as pool:
-        for count, _ in enumerate(pool.imap_unordered(_register_all, todo), 1):
+    register = partial(_register_all, samples, settings, key)
+    try:
+        for count, (_, result) in enumerate(each(register, todo, workers), 1):
+            if isinstance(result, Exception):
+                raise result
             if progress is not None:
                 progress(count, len(todo))
+    finally:
+        _templates.clear()
     return CorrespondReport(names, len(todo), len(paths) - len(todo))
 
 
 def choose_templates(shapes: list[Shape], count: int) -> list[int]:
-    """Indices of `count` shapes that stand for all: greedy, each the one that brings all shapes
-    nearest to a chosen one (facility location), in a coarse blurred occupancy of the surface."""
+    """Indices of `count` different shapes that stand for all.
+
+    Greedy (facility location): each next one brings all shapes nearest to a chosen one, in a
+    coarse, blurred occupancy of their surfaces.
+    """
     features = np.stack([_coarse(shape.surface_points) for shape in shapes])
     squared = (features**2).sum(1)
     product = features @ features.T
@@ -101,17 +122,17 @@ def _oriented_sample(shape: Shape, count: int) -> tuple[np.ndarray, np.ndarray]:
     return shape.surface_points[chosen], shape.surface_normals[chosen]
 
 
-_worker: dict[str, object] = {}
+_templates: dict[str, list[RegistrationTemplate]] = {}  # by key, made once in each process
 
 
-def _start_worker(
-    templates: list[tuple[np.ndarray, np.ndarray]], settings: RegistrationSettings, key: str
+def _register_all(
+    samples: list[tuple[np.ndarray, np.ndarray]],
+    settings: RegistrationSettings,
+    key: str,
+    path: Path,
 ) -> None:
-    _worker["templates"] = [RegistrationTemplate(p, n, settings) for p, n in templates]
-    _worker["key"] = key
-
-
-def _register_all(path: Path) -> None:
+    if key not in _templates:
+        _templates[key] = [RegistrationTemplate(*sample, settings) for sample in samples]
     shape = read_shape(path)
     points, normals = _oriented_sample(shape, TARGET_POINTS)
     groups = {
@@ -119,9 +140,7 @@ def _register_all(path: Path) -> None:
         for name, group in shape.correspondences.items()
         if not name.startswith("template-")
     }
-    templates = _worker["templates"]
-    assert isinstance(templates, list)
-    for number, template in enumerate(templates):
+    for number, template in enumerate(_templates[key]):
         found = template.register(points, normals)
         groups[f"template-{number:02d}"] = Correspondence(
             points=found.points,
@@ -129,4 +148,4 @@ def _register_all(path: Path) -> None:
             weight=np.exp(-((found.distance / TRUST_SCALE) ** 2)),
         )
     stamp = (read_stamp(path) or "").partition("+")[0]
-    write_shape(path, replace(shape, correspondences=groups), f"{stamp}+{_worker['key']}")
+    write_shape(path, replace(shape, correspondences=groups), f"{stamp}+{key}")

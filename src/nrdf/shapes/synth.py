@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache, partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from nrdf.errors import DataError
-from nrdf.shapes.dataset import Correspondence, IndexRow, Shape, read_stamp, write_index, write_shape
+from nrdf.errors import DataError, OutputError
+from nrdf.shapes.dataset import (
+    INDEX,
+    Correspondence,
+    IndexRow,
+    Shape,
+    made_by,
+    read_index,
+    write_index,
+    write_shape,
+)
 from nrdf.shapes.families import SurfaceCoordinates, get_family
+from nrdf.shapes.pool import each
 
 SURFACE_POINTS = 8192
 QUERIES = 16384
@@ -34,35 +43,50 @@ def synthesise(
     """Write `count` members of a family as training shapes into the folder `out`.
 
     Member i is made of the seed `seed + i`, so a larger run goes on from a smaller one; members
-    that are there already are kept. Every 20th is for validation. `progress` is told (done, count).
-    Returns how many were written now. Raises DataError for a count below 1.
+    that are there already are kept, and so are shapes from elsewhere that the folder's index
+    lists. Every 20th is for validation. `progress` is told (done, to do). Returns how many were
+    written now. Raises DataError for a count below 1 or an unknown family, OutputError if the
+    folder cannot be written.
     """
     if count < 1:
         raise DataError(f"{count} shapes asked for; give at least 1")
+    if seed < 0:
+        raise DataError(f"a seed must not be negative, this one is {seed}")
     get_family(category)  # an unknown name is an error before anything is made
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     seeds = range(seed, seed + count)
     stamp = f"family/1 {category} {SURFACE_POINTS} {QUERIES} {CORRESPONDENCES}"
-    todo = [
-        s
-        for s in seeds
-        if (read_stamp(out / f"{_name(category, s)}.npz") or "").partition("+")[0] != stamp
-    ]
+    todo = [s for s in seeds if made_by(out / f"{_name(category, s)}.npz") != stamp]
     make = partial(_write_member, category, out, stamp)
-    with get_context("spawn").Pool(workers) as pool:
-        for done, _ in enumerate(pool.imap_unordered(make, todo, chunksize=4), 1):
-            if progress is not None:
-                progress(done, len(todo))
-    write_index(
+    for done, (_, result) in enumerate(each(make, todo, workers), 1):
+        if isinstance(result, Exception):
+            raise result
+        if progress is not None:
+            progress(done, len(todo))
+    splits = ["train" if (s + 1) % VALIDATION_EVERY else "val" for s in seeds]
+    add_to_index(
         out,
         [
-            IndexRow(
-                _name(category, s), "family", "train" if (s + 1) % VALIDATION_EVERY else "val", "MIT"
-            )
-            for s in seeds
+            IndexRow(_name(category, s), "family", split, "MIT")
+            for s, split in zip(seeds, splits, strict=True)
         ],
     )
     return len(todo)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder where there is none. Raises OutputError if that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
+
+
+def add_to_index(folder: Path, rows: list[IndexRow]) -> None:
+    """Write `rows` into a data folder's index; rows of other names that it has are kept."""
+    new = {row.name for row in rows}
+    others = read_index(folder) if (folder / INDEX).exists() else []
+    write_index(folder, [row for row in others if row.name not in new] + rows)
 
 
 def member_shape(category: str, seed: int) -> Shape:
