@@ -1,0 +1,281 @@
+"""Retrieval with an untrained field, whose C puts a shape's points exactly onto the same shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from nrdf.cloud import PointCloud
+from nrdf.errors import CloudError, RegionError
+from nrdf.field import build_field
+from nrdf.regions.model import WORKING_POINTS, Model, encoder_subset
+from nrdf.shapes.families import get_family
+from solids import box
+
+SMALL = {
+    "encoder_points": 256,
+    "latent": 16,
+    "point_features": 16,
+    "plane_channels": 4,
+    "plane_cells": 8,
+    "plane_layers": 1,
+    "octaves": 1,
+    "decoder_width": 16,
+    "decoder_blocks": 1,
+    "inverse_width": 16,
+    "inverse_blocks": 1,
+    "look_blocks": 1,
+}
+COUNT = 3000
+OFFSET = np.array([200.0, -4000.0, 50.0])
+
+
+def build(**sizes) -> Model:
+    torch.manual_seed(0)
+    return Model(build_field("default", {**SMALL, **sizes}), {"category": "chair"})
+
+
+def chair(seed: int = 0, count: int = COUNT, draw: int = 0):
+    """A cloud of a chair, and its regions as masks."""
+    family = get_family("chair")
+    sample = family.member(seed).sample_surface(count, np.random.default_rng(draw))
+    names = family.region_of(sample.coordinates)
+    masks = {name: names == name for name in ("seat", "back-front", "back-back")}
+    return PointCloud(sample.points, sample.normals), masks
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return build()
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return chair()
+
+
+@pytest.fixture(scope="module")
+def taught(model, reference):
+    return model.set_reference(reference[0])
+
+
+def overlap(found: np.ndarray, mask: np.ndarray) -> float:
+    """Intersection over union."""
+    other = np.zeros(len(mask), bool)
+    other[found] = True
+    return (other & mask).sum() / (other | mask).sum()
+
+
+def check(match, count: int) -> None:
+    """What holds for every match."""
+    assert match.indices.dtype.kind == "i" and (np.diff(match.indices) > 0).all()
+    assert len(match.indices) == 0 or (match.indices[0] >= 0 and match.indices[-1] < count)
+    assert match.confidence.shape == match.indices.shape
+    assert (match.confidence >= 0).all() and (match.confidence <= 1).all()
+    assert np.isfinite(match.points).all()
+
+
+def test_a_model_says_what_it_is(model):
+    assert (model.category, model.preset) == ("chair", "default")
+    assert repr(model) == "Model(category='chair', preset='default', device=cpu)"
+    assert not model.field.training
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_on_the_reference_itself_regions_are_found_again(taught, reference, method):
+    cloud, masks = reference
+    matches = taught.retrieve_all(masks, cloud, method)
+    assert list(matches) == list(masks)
+    for name, match in matches.items():
+        check(match, COUNT)
+        assert match.method == method
+        assert overlap(match.indices, masks[name]) > (0.9 if method == "mask" else 0.999)
+        np.testing.assert_allclose(match.points, cloud.points[masks[name]], atol=1e-5)
+        # existence starts at 3, log error at -3, and the field is right about neither
+        start = 0.9526 * np.exp(-np.exp(-3) / 0.05)
+        assert start * 0.75 < match.score <= start + 1e-3
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_raw_points_are_one_for_each_region_point_in_order(taught, reference, method):
+    cloud, _ = reference
+    region = np.random.default_rng(0).permutation(COUNT)[:100]
+    match = taught.retrieve(region, cloud, method)
+    np.testing.assert_allclose(match.points, cloud.points[region], atol=1e-5)
+    as_points = taught.retrieve(cloud.points[region], cloud, method)
+    np.testing.assert_array_equal(as_points.points, match.points)
+    np.testing.assert_array_equal(as_points.indices, match.indices)
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_results_are_in_the_targets_own_coordinates(taught, reference, method):
+    cloud, masks = reference
+    moved = PointCloud(1000.0 * cloud.points + OFFSET, cloud.normals, unit="mm")
+    match = taught.retrieve(masks["seat"], moved, method)
+    np.testing.assert_allclose(match.points, moved.points[masks["seat"]], atol=0.01)
+    same = taught.retrieve(masks["seat"], cloud, method)
+    assert overlap(same.indices, np.isin(np.arange(COUNT), match.indices)) > 0.99
+
+
+def test_a_reference_may_have_any_scale_too(model, reference):
+    cloud, masks = reference
+    far = PointCloud(1000.0 * cloud.points + OFFSET, cloud.normals)
+    match = model.set_reference(far).retrieve(far.points[masks["seat"]], cloud)
+    np.testing.assert_allclose(match.points, cloud.points[masks["seat"]], atol=1e-4)
+    assert overlap(match.indices, masks["seat"]) > 0.9
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_another_chair_is_searched(taught, reference, method):
+    target, truth = chair(seed=5)
+    matches = taught.retrieve_all(reference[1], target, method)
+    for match in matches.values():
+        check(match, COUNT)
+    assert overlap(matches["seat"].indices, truth["seat"]) > 0.1
+    here = taught.retrieve_all(reference[1], reference[0], method)
+    assert matches["seat"].score < here["seat"].score
+
+
+def test_front_and_back_of_a_backrest_are_kept_apart(model, reference):
+    cloud, masks = reference
+    other, truth = chair(draw=1)
+    matches = model.set_reference(cloud).retrieve_all(masks, other)
+    for name, against in (("back-front", "back-back"), ("back-back", "back-front")):
+        assert overlap(matches[name].indices, truth[name]) > 0.8
+        assert truth[against][matches[name].indices].mean() < 0.05
+
+
+def test_normals_are_estimated_where_there_are_none(model, reference):
+    cloud, masks = reference
+    bare = PointCloud(cloud.points)
+    match = model.set_reference(bare).retrieve(masks["seat"], bare)
+    assert overlap(match.indices, masks["seat"]) > 0.9
+
+
+@pytest.fixture(scope="module")
+def dense():
+    return chair(count=40_000, draw=1)
+
+
+@pytest.mark.parametrize("method", ["mask", "points"])
+def test_a_dense_target_gets_results_for_all_its_points(taught, reference, dense, method):
+    cloud, truth = dense
+    embedded = taught.model.embed(cloud)
+    assert len(embedded.working) == len(embedded.points) == WORKING_POINTS < len(cloud)
+    match = taught.retrieve(reference[1]["seat"], embedded, method)
+    check(match, len(cloud))
+    if method == "points":
+        assert truth["seat"][match.indices].mean() > 0.9
+    else:
+        assert overlap(match.indices, truth["seat"]) > 0.9
+        unused = ~np.isin(match.indices, embedded.working)
+        assert unused.mean() == pytest.approx(1 - WORKING_POINTS / len(cloud), abs=0.1)
+
+
+def test_a_dense_reference_keeps_every_point_of_its_regions(model, dense):
+    cloud, masks = dense
+    taught = model.set_reference(cloud)
+    region = np.flatnonzero(masks["seat"])[::-1]
+    by_mask = taught.retrieve(region, cloud)
+    assert overlap(by_mask.indices, masks["seat"]) > 0.9
+    np.testing.assert_allclose(by_mask.points, cloud.points[region], atol=1e-5)
+    # A region that lies wholly between the points in use is not lost.
+    unused = np.setdiff1d(region, taught.reference.working)[:40]
+    assert taught._working_mask(unused).any()
+    by_points = taught.retrieve(unused, cloud, "points")
+    np.testing.assert_allclose(by_points.points, cloud.points[unused], atol=1e-5)
+
+
+def test_the_target_is_embedded_and_mapped_once_for_all_regions(model, reference, monkeypatch):
+    taught, calls = model.set_reference(reference[0]), []
+    for name in ("embed", "describe", "invert"):
+        own = getattr(model.field, name)
+        monkeypatch.setattr(
+            model.field, name, lambda *a, own=own, name=name: calls.append(name) or own(*a)
+        )
+    target, _ = chair(seed=5)
+    taught.retrieve_all(reference[1], target)
+    assert calls == ["embed", "invert"]
+    calls.clear()
+    embedded = model.embed(target)
+    first = taught.retrieve_all(reference[1], embedded)
+    again = taught.retrieve_all(reference[1], embedded, "points")
+    assert calls.count("embed") == 1 and "describe" not in calls
+    assert set(embedded.seconds) == {"normalise", "normals", "embed", "map", "associate"}
+    assert all(first[name].points.shape == again[name].points.shape for name in first)
+
+
+def test_the_same_call_gives_the_same_answer(reference):
+    target, _ = chair(seed=5)
+    one, two = (
+        build().set_reference(reference[0]).retrieve(reference[1]["seat"], target) for _ in "ab"
+    )
+    np.testing.assert_array_equal(one.indices, two.indices)
+    np.testing.assert_array_equal(one.points, two.points)
+    np.testing.assert_array_equal(one.confidence, two.confidence)
+
+
+def test_the_order_of_points_does_not_matter(reference):
+    """Where the encoder sees all points, so that which ones it sees cannot depend on the order."""
+    model = build(encoder_points=COUNT)
+    with torch.no_grad():
+        for parameter in model.field.parameters():
+            parameter.add_(0.03 * torch.randn_like(parameter))
+    cloud, masks = reference
+    target, _ = chair(seed=5)
+    first = model.set_reference(cloud).retrieve(masks["seat"], target)
+    order, other = np.random.default_rng(0).permutation(COUNT), np.random.default_rng(1)
+    other = other.permutation(COUNT)
+    again = model.set_reference(cloud.select(order)).retrieve(
+        masks["seat"][order], target.select(other)
+    )
+    assert len(first.indices) > 50
+    assert overlap(other[again.indices], np.isin(np.arange(COUNT), first.indices)) > 0.98
+    expected = np.zeros((COUNT, 3))
+    expected[np.flatnonzero(masks["seat"])] = first.points
+    np.testing.assert_allclose(again.points, expected[order[masks["seat"][order]]], atol=1e-3)
+
+
+def test_a_field_that_doubts_lowers_the_confidence(reference):
+    model = build()
+    cloud, masks = reference
+    sure = model.set_reference(cloud).retrieve(masks["seat"], cloud)
+    with torch.no_grad():
+        model.field.inverse.leave.bias[7] = 1.0  # log error
+    unsure = model.set_reference(cloud).retrieve(masks["seat"], cloud)
+    with torch.no_grad():
+        model.field.inverse.leave.bias[6] = -13.0  # existence
+    absent = model.set_reference(cloud).retrieve(masks["seat"], cloud)
+    assert sure.score > 1.3 * unsure.score > 0 and absent.score < 1e-4
+    np.testing.assert_array_equal(sure.indices, unsure.indices)
+
+
+def test_the_encoder_sees_the_extreme_points():
+    points = np.random.default_rng(0).normal(size=(2000, 3))
+    chosen = encoder_subset(points, 100)
+    assert 100 <= len(chosen) <= 106 and len(np.unique(chosen)) == len(chosen)
+    np.testing.assert_array_equal(np.ptp(points[chosen], axis=0), np.ptp(points, axis=0))
+
+
+def test_an_unknown_method_is_refused(taught, reference):
+    with pytest.raises(RegionError, match="no method 'magic'; known: mask, points"):
+        taught.retrieve(reference[1]["seat"], reference[0], "magic")
+
+
+def test_a_wrong_region_is_named(taught, reference):
+    good = reference[1]["seat"]
+    with pytest.raises(RegionError, match="region 'rim': the region is empty"):
+        taught.retrieve_all({"seat": good, "rim": []}, reference[0])
+
+
+def test_clouds_that_cannot_be_used_are_refused(model, taught, reference):
+    points, normals = box((1.0, 0.5, 0.3), 400)
+    with pytest.raises(CloudError, match="255 points; at least 256 are needed"):
+        model.set_reference(PointCloud(points[:255]))
+    flat = points * [1.0, 1.0, 0.0]
+    with pytest.raises(CloudError, match="flat"):
+        taught.retrieve(reference[1]["seat"], PointCloud(flat, normals))
+    points[7, 1] = np.nan
+    with pytest.raises(CloudError, match="NaN"):
+        model.embed(PointCloud(points))
