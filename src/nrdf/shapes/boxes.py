@@ -16,13 +16,13 @@ import numpy as np
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
 from nrdf.shapes.dataset import IndexRow, Shape, made_by, write_shape
+from nrdf.shapes.occupancy import occupancy_queries
 from nrdf.shapes.synth import (
     QUERIES,
     SURFACE_POINTS,
     VALIDATION_EVERY,
     add_to_index,
     make_folder,
-    occupancy_queries,
 )
 
 THICKEST_LEG = 0.15  # a thicker "leg" is a box around a whole base, which is mostly air

@@ -142,6 +142,12 @@ def read_stamp(path: str | Path) -> str | None:
         return None
 
 
+def made_by(path: str | Path) -> str | None:
+    """The stamp of a shape file up to the first "+", behind which later steps add theirs."""
+    stamp = read_stamp(path)
+    return None if stamp is None else stamp.partition("+")[0]
+
+
 def _read_folder(path: Path) -> Shape:
     cloud = _load(path / "pointcloud.npz")
     _require(path / "pointcloud.npz", cloud, ("points", "normals"))

@@ -20,15 +20,12 @@ from nrdf.shapes.dataset import (
     write_shape,
 )
 from nrdf.shapes.families import SurfaceCoordinates, get_family
+from nrdf.shapes.occupancy import occupancy_queries
 from nrdf.shapes.pool import each
 
 SURFACE_POINTS = 8192
 QUERIES = 16384
 CORRESPONDENCES = 4096
-PADDING = 0.1
-"""Share of the longest side by which the box of uniform queries is larger."""
-NEAR = 0.02
-"""Canonical standard deviation of the queries near the surface."""
 VALIDATION_EVERY = 20
 
 
@@ -118,15 +115,6 @@ def member_shape(category: str, seed: int) -> Shape:
 @lru_cache
 def _canonical_coordinates(category: str) -> SurfaceCoordinates:
     return get_family(category).canonical_coordinates(CORRESPONDENCES, np.random.default_rng(0))
-
-
-def occupancy_queries(surface: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Queries (count, 3) float16 of a canonical surface (n, 3): half uniform in the padded unit
-    box, half near the surface."""
-    uniform = rng.uniform(-0.5 * (1 + PADDING), 0.5 * (1 + PADDING), (count // 2, 3))
-    near = surface[rng.integers(0, len(surface), count - count // 2)]
-    near = near + rng.normal(0, NEAR, near.shape)
-    return np.concatenate([uniform, near]).astype(np.float16)
 
 
 def _name(category: str, seed: int) -> str:

@@ -1,0 +1,165 @@
+"""Triangle meshes as they are found: faces turned outwards, and the skin that is seen from outside.
+
+Meshes from the wild have faces of either winding, faces given twice (once for each side), parts
+that overlap, and insides (cabins, double shells) that no sensor ever sees.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from nrdf.errors import DataError
+from nrdf.geometry import visibility
+
+MOST_FACES = 5_000_000
+SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
+_CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Points (n, 3) of a mesh that are seen from outside, with outward unit normals (n, 3)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+
+
+def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v, 3) float64, in the file's unit, and faces (f, 3) int64 of the mesh `path`.
+
+    Any format that trimesh reads; a scene's meshes are put together. Equal vertices are merged,
+    faces without area and repeated faces left out. Raises DataError if the file cannot be read,
+    or holds no surface, vertices that are not finite, or more than five million faces.
+    """
+    import trimesh
+
+    logging.getLogger("trimesh").setLevel(logging.ERROR)
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False)
+    except FileNotFoundError as error:
+        raise DataError(f"no mesh file {path}") from error
+    except Exception as error:  # trimesh raises whatever its parsers raise
+        raise DataError(f"{path}: unreadable as a mesh, truncated or damaged ({error})") from error
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
+        raise DataError(f"{path}: empty: no faces")
+    if len(mesh.faces) > MOST_FACES:
+        raise DataError(
+            f"{path}: {len(mesh.faces)} faces; at most {MOST_FACES} are used: simplify the mesh"
+        )
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise DataError(f"{path}: damaged: a face names a vertex that does not exist")
+    if not np.isfinite(vertices[np.unique(faces)]).all():
+        raise DataError(f"{path}: has vertices that are NaN or infinite")
+    return clean(vertices, faces)
+
+
+def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Merge equal vertices and drop faces without area, repeated faces and unused vertices.
+
+    Without this a face that is given twice, once for each side, cancels itself: the winding number
+    is 0 on both sides. Raises DataError if no face is left.
+    """
+    used, faces = np.unique(faces, return_inverse=True)
+    vertices = vertices[used]
+    extent = float(np.ptp(vertices, axis=0).max())
+    cells = 2_000_000  # so many steps a side, so that three coordinates fit into 64 bits
+    grid = np.round((vertices - vertices.min(axis=0)) * (cells / max(extent, 1e-300)))
+    grid = grid.astype(np.uint64)
+    key = (grid[:, 0] * np.uint64(cells + 1) + grid[:, 1]) * np.uint64(cells + 1) + grid[:, 2]
+    _, first, merged = np.unique(key, return_index=True, return_inverse=True)
+    vertices, faces = vertices[first], merged[faces.reshape(-1, 3)]
+    corners = vertices[faces]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    faces = faces[area > 1e-14 * extent**2]
+    if len(faces) == 0:
+        raise DataError("the mesh has no surface: no face has an area")
+    low, middle, high = np.sort(faces, axis=1).T
+    count = np.uint64(len(vertices))
+    key = (low.astype(np.uint64) * count + middle.astype(np.uint64)) * count
+    once = np.unique(key + high.astype(np.uint64), return_index=True)[1]
+    return vertices, faces[np.sort(once)]
+
+
+def outer_skin(
+    vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, Skin]:
+    """Faces (f, 3) turned outwards, and `count` random points of the skin seen from outside.
+
+    Points are drawn evenly over the area; those that fewer than 3 of 40 directions see are left
+    out. Each consistently wound patch is turned as a whole, to the side that it is seen from
+    (Takayama et al., 2014), hidden ones so that they enclose a positive volume. Raises DataError
+    if too little of the surface is seen.
+    """
+    patch, flip = _patches(faces)
+    faces = np.where(flip[:, None], faces[:, ::-1], faces)
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    cumulative = np.cumsum(area)
+    if not cumulative[-1] > 0.0:
+        raise DataError("the mesh has no surface: no face has an area")
+    drawn = 3 * count
+    for _ in range(4):
+        face = np.searchsorted(cumulative, rng.random(drawn) * cumulative[-1])
+        face = np.minimum(face, len(faces) - 1)
+        first, second = rng.random((2, drawn, 1))
+        first = np.sqrt(first)
+        triangle = corners[face]
+        points = triangle[:, 0] * (1 - first) + triangle[:, 1] * (first * (1 - second))
+        points += triangle[:, 2] * (first * second)
+        normals = cross[face] / area[face, None]
+        vote, front, back = visibility(points, normals)
+        skin = np.flatnonzero(np.maximum(front, back) >= SEEN_BY)
+        if len(skin) >= count:
+            break
+        drawn *= 2
+    else:
+        raise DataError(f"only {len(skin)} of {len(points)} points of its surface are visible")
+
+    patches = int(patch.max()) + 1
+    seen_from = np.bincount(patch[face], vote, patches)
+    seen = np.bincount(patch[face], front + back, patches)
+    middle = vertices.mean(axis=0)
+    volume = np.bincount(patch, ((corners.mean(axis=1) - middle) * cross).sum(axis=1), patches)
+    inward = np.where(np.abs(seen_from) > 0.05 * seen, seen_from < 0.0, volume < 0.0)[patch]
+    faces = np.where(inward[:, None], faces[:, ::-1], faces)
+
+    skin = skin[:count]
+    turned = np.where(inward[face[skin]], -1.0, 1.0)
+    clear = np.abs(vote[skin]) > _CLEAR_VOTE
+    sign = np.where(clear, np.sign(vote[skin]), turned)
+    return faces, Skin(points[skin], sign[:, None] * normals[skin])
+
+
+def _patches(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Patch (f,) of each face, and whether it must be flipped (f,) to agree with its patch.
+
+    Faces belong together across edges that exactly two share. The two sides of every face are
+    nodes of a graph whose edges join sides that agree, so its components are oriented patches.
+    """
+    count = len(faces)
+    tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    upwards = tail < head
+    key = np.minimum(tail, head) * (int(faces.max()) + 1) + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    start = np.flatnonzero(np.diff(key[order], prepend=-1))
+    shared = np.diff(start, append=len(key)) == 2
+    one, two = order[start[shared]], order[start[shared] + 1]
+    disagree = upwards[one] == upwards[two]
+    one, two = one // 3, two // 3
+    tails = np.concatenate([one, one + count])
+    heads = np.concatenate([two + count * disagree, two + count * ~disagree])
+    graph = coo_matrix((np.ones(len(tails), dtype=bool), (tails, heads)), (2 * count, 2 * count))
+    label = connected_components(graph, directed=False)[1]
+    patch = np.minimum(label[:count], label[count:])
+    return np.unique(patch, return_inverse=True)[1], label[:count] > label[count:]
