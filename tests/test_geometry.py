@@ -11,8 +11,8 @@ from nrdf.geometry import (
     canonical_transform,
     estimate_normals,
     fibonacci_directions,
-    outward_by_visibility,
     thin,
+    visibility,
 )
 
 
@@ -174,14 +174,17 @@ def test_coincident_points_do_not_upset_the_normals():
     assert ((normals[:1000] * truth).sum(axis=1) > 0).mean() > 0.99
 
 
-def test_flipped_normals_are_turned_outwards_and_buried_points_found():
+def test_visibility_tells_the_outer_side_and_finds_buried_points():
     rng = np.random.default_rng(0)
     outer, outer_normals = sphere(rng, 6000)
     inner, inner_normals = sphere(rng, 1000, radius=0.3)
     points = np.concatenate([outer, inner])
     given_normals = np.concatenate([outer_normals, inner_normals])
-    given_normals[::3] *= -1
-    normals, seen_by = outward_by_visibility(points, given_normals)
-    assert ((normals[:6000] * outer_normals).sum(axis=1) > 0.99).all()
-    assert (seen_by[:6000] >= 2).mean() > 0.999
-    assert (seen_by[6000:] < 2).mean() > 0.95
+    given_normals[:6000:3] *= -1
+    vote, front, back = visibility(points, given_normals)
+    outward = (given_normals * points).sum(axis=1) > 0
+    assert ((vote > 0) == outward)[:6000].all()
+    seen, unseen = np.where(outward, front, back), np.where(outward, back, front)
+    assert (seen[:6000] >= 10).mean() > 0.999
+    assert unseen[:6000].mean() < 1.0
+    assert (np.maximum(front, back)[6000:] < 3).mean() > 0.95

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from nrdf import ply
-from nrdf.errors import CloudError
-from nrdf.geometry import outward_by_visibility
+from nrdf.errors import CloudError, DataError
 
 logger = logging.getLogger(__name__)
 
@@ -372,20 +371,12 @@ def _read_obj(path: Path, mesh_samples: int) -> PointCloud:
 
 def _read_mesh(path: Path, samples: int) -> PointCloud:
     """Sample the visible surface of the mesh `path` evenly, the same points every time."""
-    import trimesh
+    from nrdf.mesh import load_mesh, outer_skin
 
     try:
-        mesh = trimesh.load(path, force="mesh", process=False)
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise CloudError(f"{path}: truncated or damaged mesh ({error})") from error
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise CloudError(f"{path}: the mesh holds no faces")
-    if not np.isfinite(mesh.vertices).all() or not mesh.area > 0.0:
-        raise CloudError(f"{path}: the mesh has no surface, or vertices that are not finite")
-    logger.info("%s is a mesh: sampled %d points of its surface", path, samples)
-    rng = np.random.default_rng(0)
-    points, face = trimesh.sample.sample_surface(mesh, 2 * max(samples, 1), seed=rng)
-    points = np.asarray(points, dtype=np.float64)
-    normals, seen_by = outward_by_visibility(points, mesh.face_normals[face])
-    visible = np.flatnonzero(seen_by >= 2)[:samples]
-    return PointCloud(points[visible], normals[visible])
+        vertices, faces = load_mesh(path)
+        skin = outer_skin(vertices, faces, samples, np.random.default_rng(0))[1]
+    except DataError as error:
+        raise CloudError(str(error)) from error
+    logger.info("%s is a mesh: sampled %d points of its surface", path, len(skin.points))
+    return PointCloud(skin.points, skin.normals)

@@ -139,32 +139,31 @@ def estimate_normals(points: np.ndarray, neighbours: int = 16, directions: int =
     return np.where(sign < 0.0, -1.0, 1.0)[:, None] * normals.astype(np.float64)
 
 
-def outward_by_visibility(
+def visibility(
     points: np.ndarray, normals: np.ndarray, directions: int = 40
-) -> tuple[np.ndarray, np.ndarray]:
-    """Turn each of `normals` (n, 3) to the side that `points` (n, 3) are seen from.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """From which side, and from how many of `directions`, `points` (n, 3) of a surface are seen.
 
-    Returns the normals (n, 3), and for each point the number (n,) of the `directions` that see it
-    from that side; points inside a hull are seen by few or none.
+    Returns, each (n,): the sum over the directions that see a point of the cosine to its normal
+    (`normals` (n, 3), any sign); the number of those in front of it; the number of those behind.
+    Points inside a hull are seen by few or none.
     """
-    points32 = points.astype(np.float32)
-    normals32 = normals.astype(np.float32)
-    spacing = _spacing(_nearest(points32, min(9, len(points)))[0])
+    points, normals = points.astype(np.float32), normals.astype(np.float32)
+    spacing = _spacing(_nearest(points, min(9, len(points)), workers=1)[0])
     vote = np.zeros(len(points))
     front, back = np.zeros((2, len(points)), dtype=np.int64)
-    views = fibonacci_directions(directions).astype(np.float32)
-    for view, seen in _depth_images(points32, normals32, views, spacing, 0.4):
-        facing = normals32 @ view
+    views = fibonacci_directions(directions)
+    for view, seen in _depth_images(points, normals, views, spacing, 0.4):
+        facing = normals @ view
         vote += seen * facing
         front += seen & (facing > 0.0)
         back += seen & (facing < 0.0)
-    flip = vote < 0.0
-    return np.where(flip[:, None], -normals, normals), np.where(flip, back, front)
+    return vote, front, back
 
 
-def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(points: np.ndarray, count: int, workers: int = -1) -> tuple[np.ndarray, np.ndarray]:
     """Distances and indices, each (n, count), of the nearest points, the point itself first."""
-    distance, index = cKDTree(points).query(points, count, workers=-1)
+    distance, index = cKDTree(points).query(points, count, workers=workers)
     return distance.astype(np.float32), index
 
 
