@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from nrdf import cli
 from nrdf.bundled import bundled_chair
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
+from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.ply import read_header, read_scalars
 
 VERBS = sorted(cli.verbs())
@@ -160,8 +162,6 @@ def test_two_regions_of_one_name_are_refused(retrieve, files, capsys):
 
 
 def test_unknown_model_lists_the_known(retrieve, tmp_path, capsys):
-    from nrdf.field.zoo import list_models
-
     assert retrieve(model=["chiar"]) == 2
     said = capsys.readouterr().err
     assert "no model 'chiar'; known: " in said
@@ -248,3 +248,70 @@ def test_verbose_works_anywhere(capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["info", "-v", "--as-json"])
     assert ended.value.code == 0
+
+
+def test_prepare_names_what_it_cannot_use_and_goes_on(tmp_path, capsys):
+    import trimesh
+
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    trimesh.creation.box((0.5, 1.0, 0.7)).export(meshes / "box.ply")
+    (meshes / "broken.obj").write_text("f 1 2 3")
+    words = f"prepare {meshes} --category chair --out {tmp_path}/data --workers 1 "
+    words += "--surface-points 500 --queries 500"
+    for made, kept in ((1, 0), (0, 1)):
+        assert cli.run(words.split()) == 1
+        said = capsys.readouterr()
+        assert f"{made} shapes made, {kept} were there already" in said.out
+        assert "not used: broken.obj: " in said.err
+    (meshes / "broken.obj").unlink()
+    assert cli.run(words.split()) == 0
+    assert cli.run(["prepare", str(tmp_path / "none"), *words.split()[2:]]) == 2
+
+
+def test_prepared_shapes_train_a_field_that_the_other_verbs_take(tmp_path, capsys):
+    import trimesh
+
+    meshes, data, run = tmp_path / "meshes", tmp_path / "data", tmp_path / "run"
+    meshes.mkdir()
+    for i in range(3):
+        trimesh.creation.box((0.5, 1.0, 0.3 + 0.2 * i)).export(meshes / f"box-{i}.ply")
+    words = f"prepare {meshes} --category chair --out {data} --workers 1 --surface-points 300"
+    assert cli.run([*words.split(), "--queries", "300"]) == 0
+    config = tmp_path / "tiny.yaml"
+    config.write_text(
+        "preset: default\n"
+        "data: {encoder_points: 128, queries: 32, correspondences: 0, surface_points: 256}\n"
+        "stages: [{name: all, weights: {occupancy: 1}, steps: 2, batch_size: 2}]\n"
+    )
+    words = f"--data {data} --config {config} --device cpu --out"
+    assert cli.run(f"train car {words} {tmp_path}/car".split()) == 2
+    assert "of category chair, not car" in capsys.readouterr().err
+    assert cli.run(f"train chair {words} {run}".split()) == 0
+    assert f"--model {run}/weights.safetensors" in capsys.readouterr().out
+    assert find_weights(run) == run / "weights.safetensors"
+    assert load_field(run)[1]["category"] == "chair"
+
+
+def test_synth_and_correspond_pass_on_what_is_asked(tmp_path, monkeypatch, capsys):
+    from nrdf.shapes.correspond import CorrespondReport
+
+    asked = []
+
+    def synthesise(category, count, out, seed, workers, progress):
+        asked.append((category, count, out, seed))
+        progress(count, count)
+        return 2
+
+    def correspond_folders(folders, templates, workers, progress):
+        asked.append((folders, templates))
+        return CorrespondReport(["a", "b"], 5, 1)
+
+    monkeypatch.setattr("nrdf.shapes.synth.synthesise", synthesise)
+    monkeypatch.setattr("nrdf.shapes.correspond.correspond_folders", correspond_folders)
+    assert cli.run(f"synth car --count 7 --seed 3 --out {tmp_path}".split()) == 0
+    assert cli.run(f"correspond {tmp_path} other --templates 2".split()) == 0
+    assert asked == [("car", 7, tmp_path, 3), ([tmp_path, Path("other")], 2)]
+    said = capsys.readouterr().out
+    assert "2 shapes made, 5 were there already" in said
+    assert "5 shapes registered, 1 were before; templates: a, b" in said

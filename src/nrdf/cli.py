@@ -19,7 +19,8 @@ Teach a region once, on one object, and find it on every object of that kind.
 NOTES = """
 Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
-Ends with 0, with 2 for bad input (the message says what to do), with 130 after Ctrl-C."""
+Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
+message that says what to do; 130 after Ctrl-C."""
 
 RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train")
 
@@ -29,7 +30,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.evaluate import bench, evaluate
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
-    from nrdf.commands.shapes import boxes, correspond, synth
+    from nrdf.commands.shapes import boxes, correspond, prepare, synth
     from nrdf.commands.show import demo
     from nrdf.commands.train import train
 
@@ -38,6 +39,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "demo": demo,
         "info": info,
         "synth": synth,
+        "prepare": prepare,
         "boxes": boxes,
         "correspond": correspond,
         "train": train,
@@ -88,15 +90,13 @@ def run(given: list[str], verbose: bool = False) -> int:
 
 
 def _show_verbs() -> None:
-    from nrdf.commands.console import table
+    from nrdf.commands.console import show, table
 
     shown = table("", "", "")
-    shown.show_header = False
-    shown.columns[1].justify = "left"
     for name, verb in verbs().items():
         shown.add_row(f"  {name}", (verb.__doc__ or "").partition("\n")[0])
     _say(USAGE)
-    _say(shown)
+    show(shown)
     _say(NOTES)
 
 
@@ -113,21 +113,16 @@ def _with_joined_lines(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _complain(message: str) -> None:
-    from rich.markup import escape
-
     from nrdf.commands.console import errors
 
-    errors.print(f"[bold red]nrdf:[/] [red]{escape(message)}[/]", soft_wrap=True)
+    errors.print(f"nrdf: {message}", style="red")
 
 
 def _configure_logging(verbose: bool) -> None:
-    from rich.logging import RichHandler
+    from nrdf.commands.console import LogHandler
 
-    from nrdf.commands.console import errors
-
-    handler = RichHandler(console=errors, show_time=verbose, show_path=verbose, markup=False)
     logger = logging.getLogger("nrdf")
-    logger.handlers = [handler]
+    logger.handlers = [LogHandler()]
     logger.setLevel(logging.DEBUG if verbose else logging.INFO)
     logger.propagate = False
 

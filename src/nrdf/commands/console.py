@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import platform
 import sys
 from collections.abc import Callable, Iterator
@@ -9,12 +10,12 @@ from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.table import Table
 
-console = Console(highlight=False)
-"""Results go to standard output."""
-errors = Console(stderr=True, highlight=False)
+console = Console(highlight=False, markup=False, soft_wrap=True)
+"""Results go to standard output. Paths are not broken, and brackets are no markup."""
+errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
 """Progress, warnings and errors go to standard error."""
 
 REPORTED = ("nrdf", "torch", "numpy", "scipy", "trimesh", "libigl", "safetensors", "tyro")
@@ -32,11 +33,29 @@ def versions() -> dict[str, str]:
 
 
 def table(title: str, *columns: str) -> Table:
-    """A plain table; the first column is text, the others are numbers."""
+    """A plain table; the first column and those without a heading are text, the others numbers."""
     made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+    made.show_header = any(columns)
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i == 0 else "right", header_style="dim")
+        justify: JustifyMethod = "right" if i and column else "left"
+        made.add_column(column, justify=justify, header_style="dim")
     return made
+
+
+def show(made: Table) -> None:
+    """Print a table, its cells wrapped to the terminal."""
+    console.print(made, soft_wrap=False)
+
+
+class LogHandler(logging.Handler):
+    """Log lines on `errors`, above any progress bar: warnings in colour, details dim."""
+
+    STYLES = {logging.DEBUG: "dim", logging.INFO: ""}  # noqa: RUF012
+
+    def emit(self, record: logging.LogRecord) -> None:
+        style = self.STYLES.get(record.levelno, "yellow")
+        origin = f"{record.name}: " if record.levelno == logging.DEBUG else ""
+        errors.print(origin + self.format(record), style=style)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tyro.conf import Positional
 
-from nrdf.commands.console import console, errors, progress_bar, table, versions
+from nrdf.commands.console import console, errors, progress_bar, show, table, versions
 from nrdf.errors import DataError
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def evaluate(
     pairs: int = 50,
     device: str = "cpu",
 ) -> None:
-    """Score retrieval on real scans (bsrc), or correspondences against exact truth (families).
+    """Score methods on real scans (bsrc) or exact truth (families).
 
     bsrc: Table II of the paper on the Benchmark for Surface Region Correspondence. CD-L1 in the
     paper's convention: for every point the Manhattan distance to its nearest neighbour in the
@@ -70,7 +70,7 @@ def evaluate(
             results.append(run(name, find, objects, category, progress))
     if out is not None:
         write_results(results, category, labels, out)
-    console.print(markdown(results, category), soft_wrap=True, markup=False)
+    console.print(markdown(results, category))
 
 
 def _evaluate_family(model: Model, category: str, pairs: int) -> None:
@@ -83,7 +83,7 @@ def _evaluate_family(model: Model, category: str, pairs: int) -> None:
     shown = table("", f"{pairs} pairs, {category}", "mean error", "median pair", "worst pair")
     for name, error in (("C", found.field), ("bounding-box copy", found.box)):
         shown.add_row(name, *(f"{f(error):.4f}" for f in (np.mean, np.median, np.max)))
-    console.print(shown)
+    show(shown)
     console.print(
         f"C is {found.ratio:.1f} times closer; lengths are shares of the longest side. "
         f"{found.shared.mean():.0%} of a reference's surface exists on its target."
@@ -97,7 +97,7 @@ def bench(
     steps: int = 3,
     out: Path | None = None,
 ) -> None:
-    """Measure speed and memory: retrieval cold and warm by phase, training steps, a cold command.
+    """Measure speed and memory of retrieval and training.
 
     8 regions on a target of 8192 points without normals, the reference embedded before. Every
     measurement runs in a process of its own.
@@ -137,7 +137,7 @@ def show_speeds(
     rows.append(("peak memory, GB", [s.peak_memory_bytes / 1e9 for s in retrieval]))
     for name, values in rows:
         shown.add_row(name, *(f"{value:.3f}" for value in values))
-    console.print(shown)
+    show(shown)
     shown = table(
         "\ntraining", "preset", "stage", "batch", "precision", "s/step", "points/s", "memory, GB"
     )
@@ -148,6 +148,6 @@ def show_speeds(
             f"{t.step_s:.3f}", f"{t.points_per_s:,.0f}", f"{memory:.2f}",
         )  # fmt: skip
     if training:
-        console.print(shown)
+        show(shown)
     for failure in failures:
-        console.print(f"[yellow]{failure.preset}, {failure.what}: {failure.reason}", soft_wrap=True)
+        console.print(f"{failure.preset}, {failure.what}: {failure.reason}", style="yellow")

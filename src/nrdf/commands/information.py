@@ -8,12 +8,12 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
-from nrdf.commands.console import console, table, versions
+from nrdf.commands.console import console, show, table, versions
 from nrdf.errors import ConfigError
 
 
 def info(as_json: bool = False) -> None:
-    """Versions, devices, and the models in the zoo with their provenance and scores.
+    """Versions, devices, and the zoo's models with their scores.
 
     Example: nrdf info
 
@@ -27,23 +27,26 @@ def info(as_json: bool = False) -> None:
     shown = table("versions", "", "")
     for name, value in found["versions"].items():
         shown.add_row(name, value)
-    console.print(shown)
+    show(shown)
     shown = table("\ndevices", "", "")
     for name, value in found["devices"].items():
         shown.add_row(name, value)
-    console.print(shown)
+    show(shown)
     shown = table("\nmodels in the zoo", "name", "preset", "MB", "trained on", "commit", "date")
     for model in found["models"]:
         sources = ", ".join(f"{n} {source}" for source, n in model["sources"].items())
         commit, date = (model["commit"] or "")[:10], (model["date"] or "")[:10]
         size = f"{model['bytes'] / 1e6:.1f}"
         shown.add_row(model["name"], model["preset"], size, sources, commit, date)
-    console.print(shown if found["models"] else "\nno models in the zoo")
+    if found["models"]:
+        show(shown)
+    else:
+        console.print("\nno models in the zoo")
     for model in found["models"]:
         scores = ", ".join(f"{name} {value:.4g}" for name, value in model["scores"].items())
-        console.print(f"{model['name']}: {scores or 'no scores'}", soft_wrap=True)
+        console.print(f"{model['name']}: {scores or 'no scores'}")
         for source, licences in model["licences"].items():
-            console.print(f"  [dim]{source}: {licences}[/]", soft_wrap=True)
+            console.print(f"  {source}: {licences}", style="dim")
 
 
 def gather() -> dict[str, Any]:
@@ -85,7 +88,7 @@ def zoo(
     scores: tuple[str, ...] = (),
     note: str = "",
 ) -> None:
-    """Add a trained field to the zoo of this checkout, to be shipped.
+    """Add a trained field to the zoo of this checkout.
 
     Files over 8 MB are refused. The index gets the checksum, and from the file preset, training
     shapes with licences, commit and date.

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.console import command_line, console, provenance, table, versions
+from nrdf.commands.console import command_line, console, provenance, show, table, versions
 from nrdf.errors import RegionError
 
 if TYPE_CHECKING:
@@ -32,7 +32,9 @@ def retrieve(
     device: str = "cpu",
     overwrite: bool = False,
 ) -> None:
-    """Find the regions of a reference object on a target object of the same category.
+    """Find the regions of a reference object on a target object.
+
+    Both are of the category that the model is for.
 
     Writes into the output folder: for each region a PLY of the target's own points in it, with
     confidence (0 to 1) and index (into the target) as properties; report.json; picture.png. All
@@ -93,7 +95,7 @@ def retrieve(
         }
         write_report(folder, report)
     show_matches(matches, target_cloud)
-    console.print(f"[dim]{clock.total:.1f} s; results, report and picture in[/] {out}")
+    console.print(f"{clock.total:.1f} s; results, report and picture in {out}")
 
 
 class Clock:
@@ -236,4 +238,4 @@ def show_matches(matches: Mapping[str, Match], target: PointCloud) -> None:
         shown.add_row(name, f"{len(match.indices)}", f"{share:.1%}", f"{match.score:.2f}")
         if not len(match.indices):
             log.warning("region '%s' was found nowhere on the target", name)
-    console.print(shown)
+    show(shown)

@@ -1,4 +1,4 @@
-"""`nrdf synth`, `nrdf prepare`, `nrdf correspond`: training shapes and their correspondences."""
+"""`nrdf synth`, `prepare`, `boxes` and `correspond`: training shapes and their correspondences."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from nrdf.commands.console import console, progress_bar
+from nrdf.commands.console import console, errors, progress_bar
 
 
 def synth(
@@ -17,9 +17,9 @@ def synth(
     seed: int = 0,
     workers: int | None = None,
 ) -> None:
-    """Make parametric training shapes, when one has no data: chair, car, plane or table.
+    """Make parametric training shapes: chair, car, plane or table.
 
-    Each comes with exact occupancy and the exact corresponding points on all the others. Started
+    For when one has no data. Each comes with exact occupancy and the exact corresponding points on all the others. Started
     again, it goes on where it was; a larger count adds to a smaller one.
 
     Example: nrdf synth chair --count 500 --out data/chair
@@ -38,12 +38,57 @@ def synth(
     console.print(f"{made} shapes made, {count - made} were there already, in {out}")
 
 
+def prepare(
+    meshes: Positional[Path],
+    category: str,
+    out: Path,
+    index: Path | None = None,
+    surface_points: int = 8192,
+    queries: int = 16384,
+    seed: int = 0,
+    workers: int | None = None,
+    overwrite: bool = False,
+) -> int:
+    """Make training shapes from meshes of any quality.
+
+    Each gets points on its visible skin, outward normals, and occupancy queries. A mesh that cannot be used is named with the reason, the others go on, and the exit code is 1.
+    Started again, it goes on where it was.
+
+    Example: nrdf prepare meshes/ --category chair --out data/meshes
+
+    Args:
+        meshes: Folder of meshes (PLY, OBJ, OFF, STL, GLB, ...): +X forward, +Y up; any unit.
+        category: What the meshes are.
+        out: Data folder to write or to go on with.
+        index: Table with the columns name, source, split and licence; index.csv beside the meshes
+            unless given. Without one, one shape in 20 is for validation.
+        surface_points: Points on each shape's surface.
+        queries: Occupancy queries of each shape, half of them near the surface.
+        seed: Seed of the points and queries.
+        workers: Processes; all cores unless given.
+        overwrite: Make again what is there already.
+    """
+    from nrdf.shapes.prepare import Settings, prepare_folder
+
+    settings = Settings(surface_points, queries, seed)
+    with progress_bar("meshes") as progress:
+        report = prepare_folder(
+            meshes, out, category, index, settings, _cores(workers), overwrite, progress
+        )
+    console.print(
+        f"{len(report.made)} shapes made, {len(report.kept)} were there already, in {out}"
+    )
+    for name, reason in sorted(report.failed.items()):
+        errors.print(f"not used: {name}: {reason}", style="yellow")
+    return report.exit_code
+
+
 def boxes(
     file: Positional[Path], category: str, count: int, out: Path, seed: int = 0, licence: str = ""
 ) -> None:
-    """Make training shapes of objects that are given as oriented boxes (PartNet's part boxes).
+    """Make training shapes of objects given as oriented boxes.
 
-    Real proportions and structure, no curved detail. Objects whose boxes hold mostly air are left
+    PartNet's part boxes, for instance. Real proportions and structure, no curved detail. Objects whose boxes hold mostly air are left
     out. Started again, it goes on where it was.
 
     Example: nrdf boxes chair_boxes.npz --category chair --count 400 --out data/chair-boxes
@@ -69,7 +114,7 @@ def correspond(
     meshes: Path | None = None,
     workers: int | None = None,
 ) -> None:
-    """Add dense correspondences between all shapes of data folders, by registering templates.
+    """Add correspondences between shapes, by registering templates.
 
     A few shapes that stand for all are registered to every one (about 0.2 s a pair on one core).
     Started again, it goes on where it was.

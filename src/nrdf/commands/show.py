@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nrdf.commands.console import command_line, console, provenance, table, versions
+from nrdf.commands.console import command_line, console, provenance, show, table, versions
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def demo(
     out: Path = Path("demo"), model: str = "chair", device: str = "cpu", overwrite: bool = False
 ) -> None:
-    """Find five regions of a bundled reference chair on three other chairs.
+    """Find five regions of a bundled chair on three other chairs.
 
     The chairs are members of the parametric family that no training set holds, so the true
     regions are known exactly; the table shows found against true. Writes a picture, a report and
@@ -42,7 +42,6 @@ def demo(
         f"\npicture, report and PLY files in {out}; next, for instance:\n"
         f"nrdf retrieve --model {model} --reference {ply}.ply --region {ply}/seat.ply "
         f"{ply}/legs.ply --target {out}/{TARGETS[0]}.ply --out result",
-        soft_wrap=True,
     )
 
 
@@ -137,4 +136,4 @@ def _show(results: list[Found]) -> None:
             row.chair if first else "", row.region, str(row.found), str(row.true),
             f"{row.iou:.2f}", f"{row.confidence:.2f}", f"{row.seconds:.2f}" if first else "",
         )  # fmt: skip
-    console.print(shown)
+    show(shown)

@@ -18,7 +18,7 @@ def train(
     out: Path | None = None,
     overwrite: bool = False,
 ) -> None:
-    """Train a field on prepared shapes; killed at any moment, the same command goes on.
+    """Train a field; killed at any moment, the same command goes on.
 
     Writes checkpoints, metrics.jsonl, TensorBoard scalars (with nrdf[train]), and at the end
     weights.safetensors, which `--model` of the other verbs takes. On several GPUs:
