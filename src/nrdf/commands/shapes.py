@@ -19,8 +19,8 @@ def synth(
 ) -> None:
     """Make parametric training shapes: chair, car, plane or table.
 
-    For when one has no data. Each comes with exact occupancy and the exact corresponding points on all the others. Started
-    again, it goes on where it was; a larger count adds to a smaller one.
+    For when one has no data. Each comes with exact occupancy and the exact corresponding points on
+    all the others. Started again, it goes on where it was; a larger count adds to a smaller one.
 
     Example: nrdf synth chair --count 500 --out data/chair
 
@@ -51,8 +51,9 @@ def prepare(
 ) -> int:
     """Make training shapes from meshes of any quality.
 
-    Each gets points on its visible skin, outward normals, and occupancy queries. A mesh that cannot be used is named with the reason, the others go on, and the exit code is 1.
-    Started again, it goes on where it was.
+    Each gets points on its visible skin, outward normals, and occupancy queries. A mesh that cannot
+    be used is named with the reason, the others go on, and the exit code is 1. Started again, it
+    goes on where it was.
 
     Example: nrdf prepare meshes/ --category chair --out data/meshes
 
@@ -88,8 +89,8 @@ def boxes(
 ) -> None:
     """Make training shapes of objects given as oriented boxes.
 
-    PartNet's part boxes, for instance. Real proportions and structure, no curved detail. Objects whose boxes hold mostly air are left
-    out. Started again, it goes on where it was.
+    PartNet's part boxes, for instance. Real proportions and structure, no curved detail. Objects
+    whose boxes hold mostly air are left out. Started again, it goes on where it was.
 
     Example: nrdf boxes chair_boxes.npz --category chair --count 400 --out data/chair-boxes
 
