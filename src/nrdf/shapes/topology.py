@@ -33,8 +33,9 @@ def add_shared_topology(meshes: Iterable[Path], folder: Path) -> dict[str, list[
     loaded: dict[str, list[tuple[str, trimesh.Trimesh]]] = defaultdict(list)
     for path in sorted(meshes):
         mesh = trimesh.load(path, process=False, force="mesh")
-        key = f"{len(mesh.vertices)} ".encode() + np.asarray(mesh.faces, np.int64).tobytes()
-        loaded[hashlib.sha256(key).hexdigest()].append((path.stem, mesh))
+        assert isinstance(mesh, trimesh.Trimesh)  # what force="mesh" means
+        content = f"{len(mesh.vertices)} ".encode() + np.asarray(mesh.faces, np.int64).tobytes()
+        loaded[hashlib.sha256(content).hexdigest()].append((path.stem, mesh))
     groups = {}
     for number, key in enumerate(sorted(key for key, found in loaded.items() if len(found) > 1)):
         name = f"shared-{number:02d}"
