@@ -89,7 +89,7 @@ def table(results: Sequence[MethodResult], category: str) -> str:
             f"| {np.median(result.seconds):.2f} |"
         )
     for name, mean in PUBLISHED[category].items():
-        lines.append(f"| published {name} (all 90 pairs) | {'| ' * len(rois)}| {mean:.3f} | |")
+        lines.append(f"| published {name} (all 90 pairs) |{' |' * len(rois)} {mean:.3f} | |")
     return "\n".join(lines)
 
 

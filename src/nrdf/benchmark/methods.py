@@ -94,35 +94,41 @@ class _Copied:
         index, _ = snap(
             points, _normals(reference), target.cloud.points, _normals(target), self.weight
         )
-        return {
-            name: index[region_indices(region, reference.cloud)]
-            for name, region in reference.regions.items()
-        }
+        return {name: index[indices] for name, indices in _region_indices(reference).items()}
 
 
 class _Registration:
     """Registration from every reference to every target, with the defaults of its module."""
 
     def __init__(self) -> None:
-        self.templates: dict[str, tuple[np.ndarray, RegistrationTemplate]] = {}
+        # One at a time, because its kernels take hundreds of megabytes; pairs come by reference.
+        self.template: tuple[str, np.ndarray, RegistrationTemplate] | None = None
 
     def __call__(self, reference: BenchmarkObject, target: BenchmarkObject) -> Found:
-        if reference.name not in self.templates:
+        if self.template is None or self.template[0] != reference.name:
             points, normals = _canonical(reference)
             chosen = np.random.default_rng(0).permutation(len(points))[:_TEMPLATE_POINTS]
             template = RegistrationTemplate(points[chosen], normals[chosen])
-            self.templates[reference.name] = (chosen, template)
-        chosen, template = self.templates[reference.name]
+            self.template = (reference.name, chosen, template)
+        _, chosen, template = self.template
         points, normals = _canonical(target)
         sample = np.random.default_rng(1).permutation(len(points))[: 2 * _TEMPLATE_POINTS]
         mapped = template.register(points[sample], normals[sample])
         asked, _ = voters(mapped.points, template.normals, points, normals, NORMAL_WEIGHT, VOTERS)
         found = {}
-        for name, region in reference.regions.items():
+        for name, indices in _region_indices(reference).items():
             member = np.zeros(len(reference.cloud.points), bool)
-            member[region_indices(region, reference.cloud)] = True
+            member[indices] = True
             found[name] = np.flatnonzero(member[chosen][asked].mean(axis=1) > 0.5)
         return found
+
+
+def _region_indices(item: BenchmarkObject) -> Found:
+    tree = cKDTree(item.cloud.points)
+    return {
+        name: region_indices(region, item.cloud, lambda: tree)
+        for name, region in item.regions.items()
+    }
 
 
 def _canonical(item: BenchmarkObject) -> tuple[np.ndarray, np.ndarray]:
