@@ -25,7 +25,9 @@ from nrdf.errors import NrdfError
 from nrdf.field import build_field
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import list_models
+from nrdf.shapes.dataset import Correspondence, Shape
 from nrdf.shapes.families import get_family
+from nrdf.shapes.occupancy import occupancy_queries
 
 CATEGORY = "chair"
 POINTS = 8192
@@ -219,7 +221,6 @@ def _retrieval_speed(
 
 
 def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]:
-    from nrdf.shapes.synth import member_shape
     from nrdf.training.config import load_config
     from nrdf.training.data import Bank, seeded
     from nrdf.training.distributed import choose_device, choose_precision
@@ -228,10 +229,7 @@ def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]
     config = load_config(preset)
     chosen = choose_device(device)
     largest = max(stage.batch_size for stage in config.stages)
-    # A few shapes under many names: what is in them does not change the cost.
-    made = [member_shape(CATEGORY, seed) for seed in range(4)]
-    shapes = [replace(made[i % len(made)], name=f"shape-{i}") for i in range(largest)]
-    bank = Bank(shapes, config.data.model_copy(update={"pools": {}}), chosen)
+    bank = Bank(_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen)
     precision = choose_precision(config.precision, chosen)
     field = build_field(config.preset, config.field).to(chosen)
     speeds = []
@@ -265,6 +263,34 @@ def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]
             )
         )
     return speeds
+
+
+def _shapes(count: int) -> list[Shape]:
+    """Training shapes: few, under many names, since what is in them does not change the cost."""
+    family, rng = get_family(CATEGORY), np.random.default_rng(0)
+    places = family.member(1).sample_surface(4096, rng).coordinates
+    made = []
+    for seed in range(2, 5):
+        member = family.member(seed)
+        surface, group = member.sample_surface(POINTS, rng), member.locate(places)
+        queries = occupancy_queries(surface.points, 2 * POINTS, rng)
+        made.append(
+            Shape(
+                name=str(seed),
+                category=CATEGORY,
+                source="family",
+                surface_points=surface.points,
+                surface_normals=surface.normals,
+                query_points=queries,
+                query_occupancies=member.occupancy(queries.astype(np.float64)),
+                correspondences={
+                    f"family-{CATEGORY}": Correspondence(
+                        group.points, group.normals, group.exists.astype(np.float32)
+                    )
+                },
+            )
+        )
+    return [replace(made[i % len(made)], name=f"shape-{i}") for i in range(count)]
 
 
 class _Stopwatch:
