@@ -91,10 +91,13 @@ class _Copied:
             low, high = bounding_box(points)
             target_low, target_high = bounding_box(target.cloud.points)
             points = (points - low) / (high - low) * (target_high - target_low) + target_low
+        regions, normals = _region_indices(reference), _normals(reference)
+        asked = np.concatenate(list(regions.values()))
         index, _ = snap(
-            points, _normals(reference), target.cloud.points, _normals(target), self.weight
+            points[asked], normals[asked], target.cloud.points, _normals(target), self.weight
         )
-        return {name: index[indices] for name, indices in _region_indices(reference).items()}
+        ends = np.cumsum([len(indices) for indices in regions.values()])
+        return dict(zip(regions, np.split(index, ends[:-1]), strict=True))
 
 
 class _Registration:
