@@ -5,6 +5,7 @@ Every measurement runs in a process of its own, so that its peak memory is its o
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -34,6 +35,10 @@ POINTS = 8192
 BARS = {"warm_s": 0.5, "peak_memory_bytes": 1.5e9, "command_s": 8.0}
 """What preset default must keep to on 2 cores: warm retrieval of 8 regions, its process's peak
 memory, and `nrdf retrieve` from a cold shell."""
+
+
+PATIENCE = 60.0
+"""Seconds after which no further training steps of a stage are measured."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,8 @@ def to_json(
     return {
         "bars": BARS,
         "threads": torch.get_num_threads(),
+        "cores": os.cpu_count(),
+        "load_average": os.getloadavg() if hasattr(os, "getloadavg") else None,
         "retrieval": [asdict(speed) for speed in retrieval],
         "training": [asdict(speed) for speed in training],
         "failures": [asdict(failure) for failure in failures],
@@ -248,7 +255,10 @@ def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]
             optimizer.step()
             seconds.append(clock.lap())
             points = sum(t.shape[:2].numel() for t in (batch.points, batch.queries, batch.source))
-        step_s = float(np.median(seconds[1:]))
+            if sum(seconds) > PATIENCE:
+                break
+        # The first step warms up, unless it was the only one that there was time for.
+        step_s = float(np.median(seconds[1:] or seconds))
         speeds.append(
             TrainingSpeed(
                 preset=preset,

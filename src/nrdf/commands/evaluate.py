@@ -126,7 +126,15 @@ def show_speeds(
     retrieval: list[RetrievalSpeed], training: list[TrainingSpeed], failures: list[Failure]
 ) -> None:
     """Two tables, and what could not be measured."""
-    shown = table("retrieval", "", *(f"{s.preset} ({s.model}, {s.device})" for s in retrieval))
+    from nrdf.benchmark.latency import BARS
+
+    names = (f"{s.preset} ({s.model}, {s.device})" for s in retrieval)
+    shown = table("retrieval", "", *names, "default must keep to")
+    bars = {
+        "further targets, 8 regions, s": BARS["warm_s"],
+        "nrdf retrieve, cold shell, s": BARS["command_s"],
+        "peak memory, GB": BARS["peak_memory_bytes"] / 1e9,
+    }
     rows = [("load weights, s", [s.load_s for s in retrieval])]
     rows.append(("reference, s", [s.reference_s for s in retrieval]))
     rows.append(("first target, 8 regions, s", [s.cold_s for s in retrieval]))
@@ -136,7 +144,8 @@ def show_speeds(
     rows.append(("nrdf retrieve, cold shell, s", [s.command_s or 0.0 for s in retrieval]))
     rows.append(("peak memory, GB", [s.peak_memory_bytes / 1e9 for s in retrieval]))
     for name, values in rows:
-        shown.add_row(name, *(f"{value:.3f}" for value in values))
+        bar = f"{bars[name]:g}" if name in bars else ""
+        shown.add_row(name, *(f"{value:.3f}" for value in values), bar)
     show(shown)
     shown = table(
         "\ntraining", "preset", "stage", "batch", "precision", "s/step", "points/s", "memory, GB"
