@@ -19,6 +19,7 @@ from nrdf.geometry import visibility
 
 MOST_FACES = 5_000_000
 SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
+_HASH = np.uint64(0x9E3779B97F4A7C15)  # odd, with evenly spread bits
 _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
 
 
@@ -70,10 +71,12 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     used, faces = np.unique(faces, return_inverse=True)
     vertices = vertices[used]
     extent = float(np.ptp(vertices, axis=0).max())
-    cells = 2_000_000  # so many steps a side, so that three coordinates fit into 64 bits
-    grid = np.round((vertices - vertices.min(axis=0)) * (cells / max(extent, 1e-300)))
-    grid = grid.astype(np.uint64)
-    key = (grid[:, 0] * np.uint64(cells + 1) + grid[:, 1]) * np.uint64(cells + 1) + grid[:, 2]
+    # Exactly equal ones only: a tolerance glues inner to outer walls, which turns the inner ones.
+    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
+    key = np.zeros(len(vertices), dtype=np.uint64)
+    for axis in range(3):  # a hash of 64 bits
+        key = (key ^ bits[:, axis] ^ (bits[:, axis] >> np.uint64(29))) * _HASH
+        key ^= key >> np.uint64(32)
     _, first, merged = np.unique(key, return_index=True, return_inverse=True)
     vertices, faces = vertices[first], merged[faces.reshape(-1, 3)]
     corners = vertices[faces]
