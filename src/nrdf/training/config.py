@@ -122,7 +122,7 @@ class TrainConfig(Strict):
     log_every: int = Field(default=20, ge=1)
 
 
-CONFIG_FOLDER = Path(__file__).resolve().parents[3] / "configs"
+CONFIG_FOLDER = Path(__file__).resolve().parents[1] / "configs"
 
 
 def load_config(source: str | Path | Mapping[str, Any]) -> TrainConfig:
