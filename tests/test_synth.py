@@ -9,6 +9,7 @@ from nrdf.errors import DataError, OutputError
 from nrdf.shapes import synth
 from nrdf.shapes.dataset import (
     IndexRow,
+    add_to_index,
     read_index,
     read_shape,
     read_stamp,
@@ -16,7 +17,8 @@ from nrdf.shapes.dataset import (
     write_index,
 )
 from nrdf.shapes.families import get_family
-from nrdf.shapes.synth import add_to_index, member_shape, occupancy_queries, synthesise
+from nrdf.shapes.occupancy import occupancy_queries
+from nrdf.shapes.synth import member_shape, synthesise
 
 EPS = 3e-5
 

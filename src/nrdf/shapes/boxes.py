@@ -15,15 +15,16 @@ import numpy as np
 
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
-from nrdf.shapes.dataset import IndexRow, Shape, made_by, write_shape
-from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.synth import (
-    QUERIES,
-    SURFACE_POINTS,
-    VALIDATION_EVERY,
+from nrdf.shapes.dataset import (
+    IndexRow,
+    Shape,
     add_to_index,
+    made_by,
     make_folder,
+    write_shape,
 )
+from nrdf.shapes.occupancy import occupancy_queries
+from nrdf.shapes.synth import QUERIES, SURFACE_POINTS, VALIDATION_EVERY
 
 THICKEST_LEG = 0.15  # a thicker "leg" is a box around a whole base, which is mostly air
 BACK, SEAT, LEG = 0, 1, 2  # labels of boxes; 3 is an arm

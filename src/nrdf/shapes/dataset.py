@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import csv
 import io
+import time
 import zipfile
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from nrdf.errors import DataError
+from nrdf.errors import DataError, OutputError
 from nrdf.ply import write_atomically
 
 INDEX = "index.csv"
@@ -264,6 +266,41 @@ def write_index(folder: str | Path, rows: list[IndexRow]) -> None:
     for row in sorted(rows, key=lambda r: r.name):
         writer.writerow([row.name, row.source, row.split, row.licence])
     write_atomically(Path(folder) / INDEX, [text.getvalue().encode("utf-8")])
+
+
+def add_to_index(folder: str | Path, rows: list[IndexRow], remove: Collection[str] = ()) -> None:
+    """Put `rows` into the index of a data folder; the rows of other names that it has are kept.
+
+    Names in `remove` that are not in `rows` are taken out.
+    """
+    folder = Path(folder)
+    gone = {row.name for row in rows}.union(remove)
+    others = read_index(folder) if (folder / INDEX).is_file() else []
+    rows = [row for row in others if row.name not in gone] + rows
+    if rows or others:
+        write_index(folder, rows)
+
+
+def make_folder(folder: str | Path) -> None:
+    """Make a data folder where there is none, and tidy up what a killed run left half-written.
+
+    Raises OutputError if it cannot be made, or holds something else than training shapes.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        entries = list(folder.iterdir())
+        for entry in entries:
+            stale = entry.suffix == ".part" and time.time() - entry.stat().st_mtime > 60.0
+            if entry.name.startswith(".") and stale:
+                entry.unlink()
+    except OSError as error:
+        raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
+    foreign = [e for e in entries if e.suffix not in (".npz", ".part") and e.name != INDEX]
+    if foreign:
+        raise OutputError(
+            f"{folder} is no data folder: it holds {foreign[0].name}; give a new or empty folder"
+        )
 
 
 def shape_paths(folder: str | Path, split: str | None = None) -> list[Path]:

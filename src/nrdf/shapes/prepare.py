@@ -20,9 +20,9 @@ from nrdf.shapes.dataset import (
     SPLITS,
     IndexRow,
     Shape,
+    add_to_index,
     made_by,
-    read_index,
-    write_index,
+    make_folder,
     write_shape,
 )
 from nrdf.shapes.occupancy import occupancy_queries, winding_numbers
@@ -79,8 +79,8 @@ def prepare_folder(
     """Make a training shape of every mesh in the folder `meshes` and below, in the folder `out`.
 
     index: a table with the columns name (or shape), source, split and licence (or
-    licence_as_stated), as a rule `index.csv` beside the meshes, where it is found by itself;
-    without one the source is the folder's name, the licence is unknown, and one shape in 20 is
+    licence_as_stated), and perhaps category; `index.csv` beside the meshes unless given. Without
+    one the source is the folder's name, the licence is unknown, and one shape in 20 is
     for validation. Shapes in `out` that were made of the same file with the same settings are
     kept, unless `overwrite`; the command can be stopped and given again. `progress` is told
     (done, all). A mesh that cannot be used is named in the report, with the reason.
@@ -103,8 +103,7 @@ def prepare_folder(
     todo = []
     for name, path in named.items():
         target = out / f"{name}.npz"
-        before = None if overwrite else made_by(target)
-        if before == _stamp(path, category, settings):
+        if not overwrite and made_by(target) == _stamp(path, category, settings):
             report.kept.append(name)
         else:
             todo.append((name, path, _provenance(table, path).source))
@@ -120,7 +119,10 @@ def prepare_folder(
             if progress is not None:
                 progress(done, len(todo))
     finally:
-        _update_index(out, [*report.made, *report.kept], named, table)
+        rows = [(name, _provenance(table, named[name])) for name in report.made + report.kept]
+        add_to_index(
+            out, [IndexRow(n, p.source, p.split, p.licence) for n, p in rows], remove=named
+        )
     return report
 
 
@@ -170,26 +172,6 @@ def prepare_mesh(path: Path, category: str, settings: Settings, source: str = ""
     )
 
 
-def make_folder(out: Path) -> None:
-    """Make the data folder `out`, or tidy up what an interrupted run left half-written there.
-
-    Raises OutputError if it cannot be made, or holds something other than training shapes.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        entries = list(out.iterdir())
-        for entry in entries:
-            if entry.name.startswith(".") and entry.suffix == ".part":
-                entry.unlink()
-    except OSError as error:
-        raise OutputError(f"cannot write {out}: {error.strerror or error}") from error
-    foreign = [e for e in entries if e.suffix not in (".npz", ".part") and e.name != INDEX]
-    if foreign:
-        raise OutputError(
-            f"{out} is no data folder: it holds {foreign[0].name}; give a new or empty folder"
-        )
-
-
 def _write_one(out: Path, category: str, settings: Settings, task: tuple[str, Path, str]) -> None:
     name, path, source = task
     shape = prepare_mesh(path, category, settings, source)
@@ -231,7 +213,7 @@ def _read_provenance(meshes: Path, index: Path | None, category: str) -> dict[st
                 f"{index}: each line needs a name (or shape) and a split of {', '.join(SPLITS)}; "
                 f"not '{name or ''}', '{split}'"
             )
-        if row.get("category") and row["category"] != category and name in table:
+        if (row.get("category") or category).lower() != category.lower():
             continue
         licence = row.get("licence") or row.get("licence_as_stated") or "unknown"
         table[name] = Provenance(row.get("source") or table[""].source, split, licence)
@@ -244,16 +226,3 @@ def _provenance(table: dict[str, Provenance], path: Path) -> Provenance:
         return found
     validation = zlib.crc32(path.stem.encode()) % _VALIDATION_EVERY == 0
     return Provenance(found.source, "val" if validation else "train", found.licence)
-
-
-def _update_index(
-    out: Path, names: list[str], paths: dict[str, Path], table: dict[str, Provenance]
-) -> None:
-    """Add lines to the index of `out`, beside those of shapes that other commands put there."""
-    rows = {row.name: row for row in read_index(out)} if (out / INDEX).is_file() else {}
-    rows = {name: row for name, row in rows.items() if name not in paths}
-    for name in names:
-        found = _provenance(table, paths[name])
-        rows[name] = IndexRow(name, found.source, found.split, found.licence)
-    if rows or names:
-        write_index(out, list(rows.values()))

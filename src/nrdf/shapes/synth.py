@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from nrdf.errors import DataError, OutputError
+from nrdf.errors import DataError
 from nrdf.shapes.dataset import (
-    INDEX,
     Correspondence,
     IndexRow,
     Shape,
+    add_to_index,
     made_by,
-    read_index,
-    write_index,
+    make_folder,
     write_shape,
 )
 from nrdf.shapes.families import SurfaceCoordinates, get_family
@@ -69,21 +68,6 @@ def synthesise(
         ],
     )
     return len(todo)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder where there is none. Raises OutputError if that cannot be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
-
-
-def add_to_index(folder: Path, rows: list[IndexRow]) -> None:
-    """Write `rows` into a data folder's index; rows of other names that it has are kept."""
-    new = {row.name for row in rows}
-    others = read_index(folder) if (folder / INDEX).exists() else []
-    write_index(folder, [row for row in others if row.name not in new] + rows)
 
 
 def member_shape(category: str, seed: int) -> Shape:
