@@ -245,7 +245,11 @@ def write_rows(path: Path, columns: Mapping[str, np.ndarray], comments: list[str
     table = np.empty(rows, dtype=layout)
     for name, column in columns.items():
         table[name] = column
-    lines = ["ply", "format binary_little_endian 1.0", *(f"comment {' '.join(c.split())}" for c in comments)]
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *(f"comment {' '.join(c.split())}" for c in comments),
+    ]
     lines.append(f"element vertex {rows}")
     lines += [f"property {names[kind[1:]]} {name}" for name, kind in layout]
     header = ("\n".join([*lines, "end_header"]) + "\n").encode("ascii", errors="replace")
