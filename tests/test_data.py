@@ -163,6 +163,18 @@ def test_pools_share_a_batch_and_pair_within_themselves():
     assert found.pool_sizes(20) == [6, 3]
 
 
+def test_a_stage_has_pools_of_its_own():
+    shapes = [Ball(f"{kind}-{i}", source=kind) for kind in ("family", "scan") for i in range(4)]
+    found = bank(shapes, pools={"family": 0.25, "*": 0.75})
+    assert found.with_pools(None) is found
+    other = found.with_pools({"scan": 0.25, "*": 0.75})
+    sources = [shapes[i].source for i in other.draw_shapes(8, 0, 0, 0, 1)[0].tolist()]
+    assert sources.count("scan") == 2 and sources.count("family") == 4
+    assert found.pool_sizes(8) == [2, 4], "the run's own pools stay"
+    with pytest.raises(ConfigError, match="source 'scan' belong to no pool"):
+        found.with_pools({"family": 1.0})
+
+
 def test_what_pools_refuse():
     shapes = [*balls(4), Ball("real", source="scan")]
     with pytest.raises(ConfigError, match="source 'scan' belong to no pool"):

@@ -74,6 +74,8 @@ class Stage(Strict):
     parts: list[str] | Literal["all"] = "all"
     """Names of the field's parts that train; the others are frozen."""
     rate: float = Field(default=1e-4, gt=0)
+    pools: dict[str, float] | None = None
+    """Shares of the sources in this stage's batches, instead of `data.pools`."""
     schedule: Literal["constant", "cosine"] = "constant"
     warmup: int = Field(default=0, ge=0)
     """Steps over which the rate rises linearly from zero."""

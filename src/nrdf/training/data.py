@@ -141,6 +141,17 @@ class Bank:
         self.group_normals = torch.cat(columns[1]).to(self.device)
         self.group_weight = torch.cat(columns[2]).to(self.device)
 
+    def with_pools(self, shares: dict[str, float] | None) -> Bank:
+        """The same shapes in other shares; itself where `shares` is None.
+
+        Raises ConfigError when the pools leave a shape out.
+        """
+        if shares is None:
+            return self
+        other = copy(self)
+        other.pools = _pools(self.sources, shares)
+        return other
+
     def plain(self) -> dict[str, Bank]:
         """By pool, the same shapes without deformation or noise; pools of one are left out."""
         config = self.config.model_copy(

@@ -112,7 +112,9 @@ def run_stages(
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
     check_parts(config, field)
-    lengths = [stage_steps(stage, bank, workers.world) for stage in config.stages]
+    lengths = [
+        stage_steps(stage, bank.with_pools(stage.pools), workers.world) for stage in config.stages
+    ]
     precision = choose_precision(config.precision, workers.device)
 
     checkpoint = latest_checkpoint(out)
@@ -132,6 +134,7 @@ def run_stages(
                 continue
             if position.stage < number:
                 position, checkpoint = Position(number, 0, position.total), None
+            pooled = bank.with_pools(stage.pools)
             parameters = select_parts(field, stage)
             optimizer = make_optimizer(parameters, stage, config.optimizer)
             if checkpoint is not None:
@@ -144,7 +147,7 @@ def run_stages(
 
             for step in range(position.step, length):
                 seed = config.seed + 7919 * number
-                batch = bank.batch(stage.batch_size, seed, step, workers.rank, workers.world)
+                batch = pooled.batch(stage.batch_size, seed, step, workers.rank, workers.world)
                 # Dropout and the like draw from the global generator.
                 torch.manual_seed(config.seed * 1_000_003 + position.total)
                 generator = seeded(workers.device, seed, step, workers.rank, 1)
