@@ -182,7 +182,11 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(retrieve, tmp_path, monkeypatch
 def test_a_real_ctrl_c_ends_with_130_and_leaves_nothing(untrained, tmp_path):
     command = [sys.executable, "-m", "nrdf.cli", "demo", "--model", str(untrained)]
     process = subprocess.Popen(
-        [*command, "--out", str(tmp_path / "demo")], stderr=subprocess.PIPE, text=True
+        [*command, "--out", str(tmp_path / "demo")],
+        stderr=subprocess.PIPE,
+        text=True,
+        # Started from a background job, the tests inherit an ignored SIGINT.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while not any(tmp_path.glob(".demo.*/*.ply")) and time.monotonic() < deadline:
