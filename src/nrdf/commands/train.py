@@ -29,7 +29,7 @@ def train(
     Args:
         category: What the shapes are; all of them must be of it.
         data: Data folders (of `nrdf prepare` or `nrdf synth`).
-        preset: default, paper or table: the configuration of that name, whose file says what it
+        preset: default, paper or car: the configuration of that name, whose file says what it
             costs.
         config: A configuration file of your own, instead of a preset.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
