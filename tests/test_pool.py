@@ -1,7 +1,13 @@
 import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
+from nrdf.ply import write_atomically
 from nrdf.shapes.pool import CRASHED, each
 
 
@@ -30,3 +36,56 @@ def test_one_worker_runs_in_this_process():
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_to_do_is_done_at_once(workers):
     assert list(each(die_of_three, [], workers)) == []
+
+
+def write_slowly(path):
+    """Be writing a file nearly all the time."""
+    for _ in range(100):
+        write_atomically(Path(path), pieces())
+
+
+def pieces():
+    for _ in range(20):
+        time.sleep(0.005)
+        yield b"piece"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on Unix")
+def test_ctrl_c_ends_all_processes_and_leaves_no_half_written_file(tmp_path):
+    script = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from test_pool import write_slowly\n"
+        "from nrdf.shapes.pool import each\n"
+        "if __name__ == '__main__':\n"
+        f"    print(list(each(write_slowly, [f'{tmp_path}/{{i}}' for i in range(40)], 2)))\n"
+    )
+    (tmp_path / "script.py").write_text(script)
+    process = subprocess.Popen(
+        [sys.executable, str(tmp_path / "script.py")],
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 60
+    while not (tmp_path / "1").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    error = process.communicate(timeout=30)[1].decode()
+    assert process.returncode != 0 and "KeyboardInterrupt" in error
+    assert gone_within(10.0, process.pid)
+    left = {p.name: p.read_bytes() for p in tmp_path.iterdir() if p.name != "script.py"}
+    assert set(left) <= {"0", "1", "2", "3"} and left
+    assert set(left.values()) == {b"piece" * 20}
+
+
+def gone_within(seconds, group):
+    """Whether the last process of a group ends within a time."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False

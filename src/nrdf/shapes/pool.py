@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -25,7 +27,8 @@ def each(
 
     `work` must be importable by name. A process that dies takes only its own task with it: tasks
     that were under way then are tried again one by one. With one worker everything runs in this
-    process. On Ctrl-C running tasks end, the others are dropped.
+    process. When the loop over the results is left early (close the generator), or on Ctrl-C, the
+    processes are ended; files that they write by `write_atomically` are whole or not there.
     """
     if workers <= 1:
         for task in tasks:
@@ -48,12 +51,12 @@ def _pooled(
 ) -> Iterator[tuple[Task, Result | Exception]]:
     context = get_context("spawn")
     with _one_thread_each():
-        pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _ignore_interrupt)
+        pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _take_signals)
         try:
             futures: dict[Future[Any], Task] = {}
             for task in tasks:
                 try:
-                    futures[pool.submit(work, task)] = task
+                    futures[pool.submit(_in_process, work, task)] = task
                 except BrokenProcessPool as error:
                     yield task, error
             for future in as_completed(futures):
@@ -61,8 +64,14 @@ def _pooled(
                 if raised is not None and not isinstance(raised, Exception):
                     raise raised
                 yield futures[future], future.result() if raised is None else raised
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+        except BaseException:
+            with _no_interrupt():
+                # Asking politely, by shutdown alone, has been seen to wait forever after Ctrl-C.
+                for process in list((pool._processes or {}).values()):
+                    process.terminate()
+                pool.shutdown(wait=True, cancel_futures=True)
+            raise
+        pool.shutdown()
 
 
 def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
@@ -72,8 +81,29 @@ def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
         return error
 
 
-def _ignore_interrupt() -> None:
+def _in_process(work: Callable[[Task], Result], task: Task) -> Result:
+    try:
+        return work(task)
+    except SystemExit:  # told to end; the pool would go on with the next task
+        os._exit(1)
+
+
+def _take_signals() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides what to do
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # an exception, so files are tidied up
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """No further Ctrl-C meanwhile, where this is the main thread and may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
