@@ -118,7 +118,7 @@ def _prepare(panel: Panel, names: list[str]) -> _Prepared:
     centre, scale = canonical_transform(points[kept])
     points = (points[kept] - centre) / scale
     normals = estimate_normals(points) if panel.normals is None else panel.normals[kept]
-    distance, near = cKDTree(points).query(points, min(7, len(points)), workers=-1)
+    distance, near = cKDTree(points).query(points, min(7, len(points)))
     # Smooth shading: normals are averaged where neighbours face the same way.
     alike = np.einsum("ni,nki->nk", normals, normals[near]) > 0.7
     smooth = np.einsum("nk,nki->ni", alike.astype(float), normals[near])

@@ -19,5 +19,5 @@ def chamfer_l1(found: np.ndarray, truth: np.ndarray) -> float:
 
 
 def _mean_nearest(points: np.ndarray, others: np.ndarray) -> float:
-    distance, _ = cKDTree(others).query(points, p=1, workers=-1)
+    distance, _ = cKDTree(others).query(points, p=1)
     return float(distance.mean())

@@ -11,6 +11,9 @@ VOTERS = 7
 """Mapped reference points that each target point asks."""
 
 
+# Trees are asked by one thread: an interrupt would free the arrays under scipy's other threads.
+
+
 def oriented_features(points: np.ndarray, normals: np.ndarray, weight: float) -> np.ndarray:
     """Positions and weighted normals side by side, (n, 6), for nearest neighbours in both.
 
@@ -32,9 +35,7 @@ def snap(
     is above 0.
     """
     tree = cKDTree(oriented_features(target, target_normals, normal_weight))
-    distance, index = tree.query(
-        oriented_features(mapped, mapped_normals, normal_weight), workers=-1
-    )
+    distance, index = tree.query(oriented_features(mapped, mapped_normals, normal_weight))
     return index, distance
 
 
@@ -54,6 +55,5 @@ def voters(
     distance, index = tree.query(
         oriented_features(target, target_normals, normal_weight),
         k=np.arange(1, min(count, len(mapped)) + 1),
-        workers=-1,
     )
     return index, distance

@@ -72,7 +72,7 @@ class Embedded:
         if self.is_whole:
             return self.working
         points = (self.cloud.points - self.centre) / self.scale
-        return cKDTree(self.points).query(points, workers=-1)[1]
+        return cKDTree(self.points).query(points)[1]
 
     @cached_property
     def tree(self) -> cKDTree:
