@@ -149,7 +149,7 @@ def visibility(
     Points inside a hull are seen by few or none.
     """
     points, normals = points.astype(np.float32), normals.astype(np.float32)
-    spacing = _spacing(_nearest(points, min(9, len(points)), workers=1)[0])
+    spacing = _spacing(_nearest(points, min(9, len(points)))[0])
     vote = np.zeros(len(points))
     front, back = np.zeros((2, len(points)), dtype=np.int64)
     views = fibonacci_directions(directions)
@@ -161,9 +161,9 @@ def visibility(
     return vote, front, back
 
 
-def _nearest(points: np.ndarray, count: int, workers: int = -1) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Distances and indices, each (n, count), of the nearest points, the point itself first."""
-    distance, index = cKDTree(points).query(points, count, workers=workers)
+    distance, index = cKDTree(points).query(points, count)
     return distance.astype(np.float32), index
 
 
