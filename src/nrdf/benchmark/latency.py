@@ -26,9 +26,9 @@ from nrdf.errors import NrdfError
 from nrdf.field import build_field
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import list_models
-from nrdf.shapes.dataset import Correspondence, Shape
+from nrdf.shapes.dataset import Shape
 from nrdf.shapes.families import get_family
-from nrdf.shapes.occupancy import occupancy_queries
+from nrdf.shapes.synth import member_shape
 
 CATEGORY = "chair"
 POINTS = 8192
@@ -277,29 +277,8 @@ def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]
 
 def _shapes(count: int) -> list[Shape]:
     """Training shapes: few, under many names, since what is in them does not change the cost."""
-    family, rng = get_family(CATEGORY), np.random.default_rng(0)
-    places = family.member(1).sample_surface(4096, rng).coordinates
-    made = []
-    for seed in range(2, 5):
-        member = family.member(seed)
-        surface, group = member.sample_surface(POINTS, rng), member.locate(places)
-        queries = occupancy_queries(surface.points, 2 * POINTS, rng)
-        made.append(
-            Shape(
-                name=str(seed),
-                category=CATEGORY,
-                source="family",
-                surface_points=surface.points,
-                surface_normals=surface.normals,
-                query_points=queries,
-                query_occupancies=member.occupancy(queries.astype(np.float64)),
-                correspondences={
-                    f"family-{CATEGORY}": Correspondence(
-                        group.points, group.normals, group.exists.astype(np.float32)
-                    )
-                },
-            )
-        )
+    surface = get_family(CATEGORY).member(1).sample_surface(4096, np.random.default_rng(0))
+    made = [member_shape(CATEGORY, seed, surface.coordinates) for seed in range(2, 5)]
     return [replace(made[i % len(made)], name=f"shape-{i}") for i in range(count)]
 
 

@@ -70,13 +70,14 @@ def synthesise(
     return len(todo)
 
 
-def member_shape(category: str, seed: int) -> Shape:
-    """The training shape of one member, with the group `family-<category>`."""
+def member_shape(category: str, seed: int, listed: SurfaceCoordinates | None = None) -> Shape:
+    """The training shape of one member, with the group `family-<category>` of the places `listed`,
+    the family's canonical list unless given."""
     family = get_family(category)
     member = family.member(seed)
     rng = np.random.default_rng([seed, 1])
     surface = member.sample_surface(SURFACE_POINTS, rng)
-    places = member.locate(_canonical_coordinates(category))
+    places = member.locate(_canonical_coordinates(category) if listed is None else listed)
     queries = occupancy_queries(surface.points, QUERIES, rng)
     return Shape(
         name=_name(category, seed),
