@@ -113,6 +113,19 @@ def robust_distance(points: Tensor, batch: Batch) -> Tensor:
     return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, batch.weight)
 
 
+def roughness(f: Forward, values: Tensor) -> Tensor:
+    """Mean of ‖v(x) − v(y)‖ over 512 random points x of each cloud and their 16 nearest y within
+    0.1; values v (b, c, d) at the clouds' points."""
+    c = f.cloud_points
+    rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
+    apart, around = distances(f.cloud[:, rows], f.cloud).topk(
+        min(17, c), dim=2, largest=False, sorted=True
+    )
+    apart, around = apart[:, :, 1:], around[:, :, 1:]
+    difference = values[:, rows, None] - gather(values, around)
+    return weighted_mean((difference.square().sum(-1) + 1e-12).sqrt(), (apart < 0.1).float())
+
+
 def occupancy(f: Forward) -> Tensor:
     """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
     return functional.binary_cross_entropy_with_logits(f.logits, f.batch.occupancy)
@@ -137,15 +150,7 @@ def emd(f: Forward) -> Tensor:
 
 def descriptor_smoothness(f: Forward) -> Tensor:
     """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
-    c = f.cloud_points
-    rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
-    apart, around = distances(f.cloud[:, rows], f.cloud).topk(
-        min(17, c), dim=2, largest=False, sorted=True
-    )
-    apart, around = apart[:, :, 1:], around[:, :, 1:]
-    k = f.descriptors.float()
-    difference = k[:, rows, None] - gather(k, around)
-    return weighted_mean((difference.square().sum(-1) + 1e-12).sqrt(), (apart < 0.1).float())
+    return roughness(f, f.descriptors.float())
 
 
 def normal_consistency(f: Forward) -> Tensor:
@@ -166,6 +171,12 @@ def descriptor_distance(f: Forward) -> Tensor:
     ours = f.field.describe(f.z[f.partner], f.cross, f.cloud_normals)
     theirs = f.descriptors
     return (nearest_distance(ours, theirs).mean() + nearest_distance(theirs, ours).mean()) / 2
+
+
+def displacement_smoothness(f: Forward) -> Tensor:
+    """IMDC's smoothness (Liu & Liu 2020): of the displacements C(z_j, θ(z_i, x)) − x, as (5) has it
+    of descriptors."""
+    return roughness(f, f.cross - f.cloud)
 
 
 def correspondence(f: Forward) -> Tensor:
@@ -222,6 +233,7 @@ LOSSES: dict[str, Callable[[Forward], Tensor]] = {
     "smoothness": descriptor_smoothness,
     "normal_consistency": normal_consistency,
     "descriptor_distance": descriptor_distance,
+    "displacement_smoothness": displacement_smoothness,
     "correspondence": correspondence,
     "landing": landing,
     "normal": normal,
