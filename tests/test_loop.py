@@ -144,6 +144,53 @@ def test_control_c_leaves_a_checkpoint_of_the_step_it_came_in(data, tmp_path, mo
     assert same(whole, run(data, tmp_path / "cut"))
 
 
+def begun(data, out, begin, **changes) -> Path:
+    return run(data, out, tiny_config(**changes), begin=begin)
+
+
+def test_a_run_begun_from_anothers_stages_ends_as_if_alone(data, tmp_path, monkeypatch):
+    first, second = (stage.model_dump() for stage in tiny_config().stages)
+    third = {**first, "name": "third", "parts": "all"}
+    stages, fewer = [first, second, third], {**third, "weights": {"correspondence": 1}}
+    run(data, tmp_path / "shared", tiny_config(stages=stages[:2]))
+    whole = run(data, tmp_path / "whole", tiny_config(stages=stages))
+    assert same(whole, begun(data, tmp_path / "begun", tmp_path / "shared", stages=stages))
+    other = run(data, tmp_path / "other", tiny_config(stages=[first, second, fewer]))
+    assert not same(whole, other)
+    # Interrupted in its own stage it goes on from its own checkpoint.
+    step, calls = loop.learning_rate, []
+
+    def interrupt(*args):
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return step(*args)
+
+    changes = {"stages": [first, second, fewer], "begin": tmp_path / "shared"}
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(loop, "learning_rate", interrupt)
+        begun(data, tmp_path / "cut", **changes)
+    assert latest_checkpoint(tmp_path / "cut").name == "step-000000018"
+    monkeypatch.setattr(loop, "learning_rate", lambda *args: calls.append(1) or step(*args))
+    calls.clear()
+    assert same(other, begun(data, tmp_path / "cut", **changes)) and len(calls) == 2
+
+
+def test_a_run_does_not_begin_from_one_that_went_another_way(data, tmp_path):
+    first, second = (stage.model_dump() for stage in tiny_config().stages)
+    run(data, tmp_path / "shared", tiny_config(stages=[first]))
+    changed = {**first, "rate": 0.5}
+    for changes, message in (
+        ({"seed": 3}, r"cannot begin from .*shared: its config\.seed is 0, not 3; begin from"),
+        ({"stages": [changed, second]}, r"its config\.stages is "),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            begun(data, tmp_path / "run", tmp_path / "shared", **changes)
+    with pytest.raises(ConfigError, match="no training run"):
+        begun(data, tmp_path / "run", tmp_path / "nothing")
+    assert not (tmp_path / "run").exists()
+
+
 def test_frozen_parts_stay_as_they_were(data, tmp_path):
     stage = {"name": "a", "weights": {"correspondence": 1}, "steps": 3, "rate": 0.05}
     config = tiny_config(stages=[{**stage, "parts": ["inverse"]}], ema=None)
@@ -220,7 +267,8 @@ def test_bfloat16_trains(data, tmp_path):
     config = tiny_config(precision="bfloat16")
     field, _ = load_weights(run(data, tmp_path / "run", config))
     assert all(value.isfinite().all() for value in field.state_dict().values())
-    assert not same(tmp_path / "run/weights.safetensors", run(data, tmp_path / "full"))
+    full = tiny_config(precision="float32")
+    assert not same(tmp_path / "run/weights.safetensors", run(data, tmp_path / "full", full))
 
 
 def test_shapes_of_another_category_are_refused(tmp_path):

@@ -14,7 +14,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from nrdf.errors import ModelError, OutputError
+from nrdf.errors import ConfigError, ModelError, OutputError
 from nrdf.ply import write_atomically
 
 FOLDER = "checkpoints"
@@ -132,6 +132,33 @@ def open_run(run: Path, identity: dict[str, Any], overwrite: bool = False) -> bo
     except (OSError, ValueError, KeyError) as error:
         raise OutputError(f"cannot use {run} for a training run: {error}") from None
     return False
+
+
+def common_checkpoint(run: Path, identity: dict[str, Any]) -> Path:
+    """The newest checkpoint of another run, if a run of `identity` comes by it too.
+
+    It does where the two differ in nothing but the stages after the checkpoint's. Raises
+    ConfigError where they differ in more, or the folder holds no run with a checkpoint.
+    """
+    checkpoint = latest_checkpoint(run)
+    try:
+        known = json.loads((run / IDENTITY).read_text())["identity"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(f"cannot begin from {run}: no training run ({error})") from None
+    if checkpoint is None:
+        raise ConfigError(f"cannot begin from {run}: it has no checkpoint yet; train it further")
+    reached = read_position(checkpoint).stage + 1
+    shared = []
+    for content in (known, json.loads(json.dumps(identity))):
+        stages = content["config"]["stages"][:reached]
+        shared.append({**content, "config": {**content["config"], "stages": stages}})
+    differing = _differences(shared[0], shared[1])
+    if differing:
+        raise ConfigError(
+            f"cannot begin from {run}: {'; '.join(differing[:4])}; begin from a run with the same "
+            "settings, stages and shapes, or from scratch"
+        )
+    return checkpoint
 
 
 def write_identity(run: Path, identity: dict[str, Any], provenance: dict[str, Any]) -> None:

@@ -23,6 +23,7 @@ from nrdf.field.base import Field
 from nrdf.field.weights import save_weights
 from nrdf.training.checkpoint import (
     Position,
+    common_checkpoint,
     latest_checkpoint,
     load_field_state,
     load_optimizer_state,
@@ -53,13 +54,15 @@ def train(
     category: str,
     device: str = "auto",
     overwrite: bool = False,
+    begin: str | Path | None = None,
 ) -> Path:
     """Train a field for one category and export its weights; returns the weight file's path.
 
     `data` are folders with an `index.csv`, `out` is the run's folder. Started again with the same
     arguments after whatever ended it, a run goes on from its newest checkpoint, to the same
     weights, bit by bit, that it would have reached undisturbed (on the same device, with as many
-    threads and processes).
+    threads and processes). So does a run that starts with the newest checkpoint of another run,
+    `begin`, which must have come there by the same settings, stages and shapes.
 
     Raises ConfigError, DataError (no shapes, another category), OutputError (the folder holds
     something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
@@ -75,16 +78,12 @@ def train(
         validation = None
         if workers.first and any(entry.split == "val" for entry in entries):
             validation = load_bank(entries, "val", config.data, workers.device)
-        if workers.first:
-            identity = {
-                "config": config.model_dump(mode="json"),
-                "category": category,
-                "shapes": bank.names,
-            }
-            if not open_run(out, identity, overwrite):
-                write_identity(out, identity, environment(workers))
+        identity = run_identity(config, category, bank.names)
+        shared = None if begin is None else common_checkpoint(Path(begin), identity)
+        if workers.first and not open_run(out, identity, overwrite):
+            write_identity(out, identity, environment(workers))
         workers.wait()
-        field, scores = run_stages(config, bank, out, workers, validation)
+        field, scores = run_stages(config, bank, out, workers, validation, shared)
         path = out / "weights.safetensors"
         if workers.first:
             save_weights(
@@ -104,11 +103,21 @@ def train(
     return path
 
 
+def run_identity(config: TrainConfig, category: str, shapes: Sequence[str]) -> dict[str, Any]:
+    """What makes a run the same run; `shapes` are the names of the training shapes, in order."""
+    return {"config": config.model_dump(mode="json"), "category": category, "shapes": list(shapes)}
+
+
 def run_stages(
-    config: TrainConfig, bank: Bank, out: Path, workers: Workers, validation: Bank | None
+    config: TrainConfig,
+    bank: Bank,
+    out: Path,
+    workers: Workers,
+    validation: Bank | None,
+    begin: Path | None = None,
 ) -> tuple[Field, dict[str, float]]:
-    """All stages from wherever the run stands; the field to export (the average, if one is kept)
-    and its scores on the validation shapes."""
+    """All stages from wherever the run stands, or from the checkpoint `begin` where it has none;
+    the field to export (the average, if one is kept) and its scores on the validation shapes."""
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
     check_parts(config, field)
@@ -117,7 +126,7 @@ def run_stages(
     ]
     precision = choose_precision(config.precision, workers.device)
 
-    checkpoint = latest_checkpoint(out)
+    checkpoint = latest_checkpoint(out) or begin
     position = Position() if checkpoint is None else read_position(checkpoint)
     average = None if checkpoint is None else load_field_state(checkpoint, field)
     if config.ema is not None:
