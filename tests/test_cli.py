@@ -75,6 +75,16 @@ def test_every_verb_explains_itself_with_an_example(verb, capsys):
     assert f"Example: nrdf {verb}" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    "group, verb", [(group, verb) for group in cli.GROUPS for verb in cli.verbs()[group]()]
+)
+def test_every_verb_of_a_group_explains_itself_with_an_example(group, verb, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.run([group, verb, "--help"])
+    assert ended.value.code == 0
+    assert f"Example: nrdf {group} {verb}" in capsys.readouterr().out
+
+
 def test_version(capsys):
     import nrdf
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import os
 import re
@@ -22,12 +23,14 @@ Every verb explains itself, with an example:  nrdf VERB --help
 Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
 message that says what to do; 130 after Ctrl-C."""
 
-RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train")
+RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc")
+GROUPS = ("eval",)
+"""Verbs that have verbs of their own: calling one gives them, name to function."""
 
 
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
-    from nrdf.commands.evaluate import bench, evaluate
+    from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
     from nrdf.commands.shapes import boxes, correspond, prepare, synth
@@ -44,7 +47,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "correspond": correspond,
         "train": train,
         "zoo": zoo,
-        "eval": evaluate,
+        "eval": evaluations,
         "bench": bench,
     }
 
@@ -67,26 +70,36 @@ def run(given: list[str], verbose: bool = False) -> int:
         if given == ["--version"]:
             _say(f"nrdf {nrdf.__version__}")
             return 0
-        import tyro
-
-        code = tyro.extras.subcommand_cli_from_dict(
-            {name: _with_joined_lines(verb) for name, verb in verbs().items()},
-            prog="nrdf",
-            args=given,
-            config=(tyro.conf.FlagCreatePairsOff,),
-        )
-        return code or 0
+        return _parse(given) or 0
     except NrdfError as error:
         _complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        goes_on = "; the same command goes on where it was" if given[0] in RESUMABLE else ""
-        _complain(f"interrupted{goes_on}")
+        resumable = given[0] in RESUMABLE or " ".join(given[:2]) in RESUMABLE
+        _complain("interrupted" + "; the same command goes on where it was" * resumable)
         return 130
     except BrokenPipeError:
         # The reader of our output has gone (`nrdf info | head`): nothing more to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def _parse(given: list[str]) -> int | None:
+    """Parse and run, one level deeper where the verb is a group."""
+    import tyro
+
+    known, prog, description = verbs(), "nrdf", None
+    if given[0] in GROUPS:
+        group = known[given[0]]
+        known, prog, description = group(), f"nrdf {given[0]}", inspect.getdoc(group)
+        given = given[1:]
+    return tyro.extras.subcommand_cli_from_dict(
+        {name: _with_joined_lines(verb) for name, verb in known.items()},
+        prog=prog,
+        description=description,
+        args=given,
+        config=(tyro.conf.FlagCreatePairsOff,),
+    )
 
 
 def _show_verbs() -> None:

@@ -2,47 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
-
-from tyro.conf import Positional
+from typing import TYPE_CHECKING, Any, Literal
 
 from nrdf.commands.console import console, errors, progress_bar, show, table, versions
-from nrdf.errors import DataError
 
 if TYPE_CHECKING:
     from nrdf.benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
-    from nrdf.regions.model import Model
 
 
-def evaluate(
-    benchmark: Positional[Literal["bsrc", "families"]],
-    category: str,
-    data: Path | None = None,
+def evaluations() -> dict[str, Callable[..., Any]]:
+    """Score methods: on scans (bsrc), on exact truth (families), on the shapes themselves (shape).
+
+    Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
+    """
+    found: dict[str, Callable[..., Any]] = {"bsrc": bsrc, "families": families}
+    if find_spec("nrdf.commands.evaluate_shape"):
+        found["shape"] = import_module("nrdf.commands.evaluate_shape").shape
+    return found
+
+
+def bsrc(
+    data: Path,
+    category: Literal["chair", "car", "plane"],
     out: Path | None = None,
     method: tuple[str, ...] = ("nrdf", "nrdf-points", "copy", "box"),
     model: str | None = None,
     labels: Literal["published", "corrected"] = "published",
-    pairs: int = 50,
     device: str = "cpu",
 ) -> None:
-    """Score methods on real scans (bsrc) or exact truth (families).
+    """The paper's Table II: regions found on the benchmark's scans.
 
-    bsrc: Table II of the paper on the Benchmark for Surface Region Correspondence. CD-L1 in the
-    paper's convention: for every point the Manhattan distance to its nearest neighbour in the
-    other set, averaged, summed over both directions. Lower is better.
-
-    families: mean distance of C's prediction from the exact corresponding point, on pairs of
-    parametric shapes that no training set holds, beside that of a bounding-box copy.
+    On the Benchmark for Surface Region Correspondence (BSRC). CD-L1 in the paper's convention: for
+    every point the Manhattan distance to its nearest neighbour in the other set, averaged, summed
+    over both directions. Lower is better.
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
     Args:
-        benchmark: bsrc or families.
-        category: chair, car or plane.
         data: BSRC's folder, with Chair, Car and plane in it.
-        out: Folder for the table (Markdown) and every pair's figures (JSON) of bsrc.
-        pairs: Pairs of members for families.
+        category: chair, car or plane.
+        out: Folder for the table (Markdown) and every pair's figures (JSON).
         method: nrdf, nrdf-points, copy, box, copy-normals, box-normals, registration.
         model: Zoo name, weight file or run; the category's model in the zoo unless given.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
@@ -55,11 +58,6 @@ def evaluate(
     from nrdf.benchmark.evaluate import write_results
     from nrdf.benchmark.methods import get_method
 
-    if benchmark == "families":
-        _evaluate_family(nrdf.load_model(model or category, device), category, pairs)
-        return
-    if data is None:
-        raise DataError("bsrc needs its folder, with Chair, Car and plane in it: --data bsrc/")
     objects = read_bsrc(data, category, labels)
     learned = any(name.startswith("nrdf") for name in method)
     loaded = nrdf.load_model(model or category, device) if learned else None
@@ -73,13 +71,33 @@ def evaluate(
     console.print(markdown(results, category))
 
 
-def _evaluate_family(model: Model, category: str, pairs: int) -> None:
+def families(
+    category: Literal["chair", "car", "plane", "table"],
+    model: str | None = None,
+    pairs: int = 50,
+    device: str = "cpu",
+) -> None:
+    """The field against the exact truth of the parametric families.
+
+    Mean distance of C's prediction from the exact corresponding point, on pairs of parametric
+    shapes that no training set holds, beside that of a bounding-box copy.
+
+    Example: nrdf eval families --category chair
+
+    Args:
+        category: chair, car, plane or table.
+        model: Zoo name, weight file or run; the category's model in the zoo unless given.
+        pairs: Pairs of members.
+        device: cpu, cuda, cuda:N or auto.
+    """
     import numpy as np
 
+    import nrdf
     from nrdf.benchmark.family import evaluate_family
 
+    loaded = nrdf.load_model(model or category, device)
     with progress_bar(f"pairs of {category}s") as progress:
-        found = evaluate_family(model, category, pairs, progress)
+        found = evaluate_family(loaded, category, pairs, progress)
     shown = table("", f"{pairs} pairs, {category}", "mean error", "median pair", "worst pair")
     for name, error in (("C", found.field), ("bounding-box copy", found.box)):
         shown.add_row(name, *(f"{f(error):.4f}" for f in (np.mean, np.median, np.max)))
