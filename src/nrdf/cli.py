@@ -23,13 +23,14 @@ Every verb explains itself, with an example:  nrdf VERB --help
 Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
 message that says what to do; 130 after Ctrl-C."""
 
-RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc")
+RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc", "ablate")
 GROUPS = ("eval",)
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 
 
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
+    from nrdf.commands.ablate import ablate
     from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
@@ -48,6 +49,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "train": train,
         "zoo": zoo,
         "eval": evaluations,
+        "ablate": ablate,
         "bench": bench,
     }
 
