@@ -10,6 +10,17 @@ from nrdf.benchmark.bsrc import FOLDERS, ROIS
 from nrdf.cloud import PointCloud, write_cloud
 from nrdf.shapes.families import SurfaceCoordinates, get_family
 
+DEV_HALF = Path(__file__).parents[2] / "shared" / "bsrc"
+NO_DEV_HALF = (
+    "the public BSRC data are not there: get the Benchmark for Surface Region Correspondence from "
+    f"the authors of NRDF and put objects 1, 3, 5, 7, 9 of Chair, Car and plane into {DEV_HALF}"
+)
+
+
+def dev_half() -> Path | None:
+    """The development half of the public benchmark, where it is at hand."""
+    return DEV_HALF if DEV_HALF.is_dir() else None
+
 
 def member_clouds(category: str, seeds, count: int = 900):
     """For each seed a member's points (n, 3) and its 8 regions' indices, which correspond.

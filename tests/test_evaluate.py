@@ -1,95 +1,122 @@
-"""The table of methods, pairs and regions."""
+"""Every method on every pair: in one process or several, whole or going on."""
 
 from __future__ import annotations
-
-import json
 
 import numpy as np
 import pytest
 
 from bsrc_folder import member_clouds, write_bsrc
+from nrdf.benchmark import evaluate as module
 from nrdf.benchmark.bsrc import ROIS, read_bsrc
-from nrdf.benchmark.evaluate import MISSED, PUBLISHED, evaluate, table, write_results
-from nrdf.benchmark.methods import get_method
-from nrdf.benchmark.metrics import chamfer_l1
-from nrdf.errors import OutputError
+from nrdf.benchmark.evaluate import evaluate, run_pair
+from nrdf.benchmark.methods import MethodSpec, build_method
+from nrdf.benchmark.metrics import METRICS, chamfer_l1
+from nrdf.benchmark.store import PairStore
+from nrdf.errors import DataError
+from nrdf.shapes.pool import CRASHED
+
+COPY, BOX = MethodSpec("copy"), MethodSpec("box")
 
 
 @pytest.fixture(scope="module")
-def objects(tmp_path_factory):
+def benchmark(tmp_path_factory):
     root = tmp_path_factory.mktemp("bsrc")
     return read_bsrc(write_bsrc(root, "chair", member_clouds("chair", (0, 1, 2))), "chair")
 
 
 @pytest.fixture(scope="module")
-def copy(objects):
-    return evaluate("copy", get_method("copy"), objects, "chair")
+def copy(benchmark):
+    return evaluate(benchmark, [COPY])[0]
 
 
 def test_copying_to_an_identical_object_costs_nothing(tmp_path):
     clouds = member_clouds("car", (2, 2))
     same = read_bsrc(write_bsrc(tmp_path, "car", clouds), "car")
-    result = evaluate("copy", get_method("copy"), same, "car")
-    assert result.distance.shape == (2, 8) and result.mean == pytest.approx(0, abs=1e-9)
+    (result,) = evaluate(same, [COPY])
+    assert result.values("cd-l1").shape == (2, 8)
+    assert result.mean() == pytest.approx(0, abs=1e-9) and result.mean("iou") == 1.0
+    assert np.isnan(result.mean("side-accuracy"))  # a car has no such region
 
 
-def test_every_pair_and_region_has_its_distance(objects, copy):
-    assert copy.pairs[:3] == [("chair1", "chair2"), ("chair1", "chair3"), ("chair2", "chair1")]
-    assert copy.distance.shape == (6, 8) and copy.rois == ROIS["chair"]
+def test_every_pair_and_region_has_its_figures(benchmark, copy):
+    pairs = [(pair.reference, pair.target) for pair in copy.pairs]
+    assert pairs[:3] == [("chair1", "chair2"), ("chair1", "chair3"), ("chair2", "chair1")]
+    assert copy.rois == ROIS["chair"] and copy.missed == 0
     assert copy.seconds.shape == (6,) and (copy.seconds > 0).all()
-    assert copy.mean == pytest.approx(copy.distance.mean()) and copy.mean > 0.01
-    first, _, third = objects
-    found = get_method("copy")(first, third)["2f"]
+    values = copy.values("cd-l1")
+    assert values.shape == (6, 8) and copy.mean() == pytest.approx(values.mean())
+    np.testing.assert_allclose(copy.by_roi("cd-l1"), values.mean(0))
+    first, _, third = benchmark.objects
+    found = build_method(COPY)(first.cloud, first.regions, third.cloud)["2f"]
     expected = chamfer_l1(third.cloud.points[found], third.regions["2f"])
-    assert copy.distance[1, ROIS["chair"].index("2f")] == pytest.approx(expected)
+    assert values[1, ROIS["chair"].index("2f")] == pytest.approx(expected)
+    assert copy.pairs[1].points["2f"] == len(found)
 
 
-def test_a_region_found_nowhere_is_counted_as_missed(objects):
-    nothing = np.zeros(0, int)
+def test_values_that_are_not_defined_are_left_out_of_means(copy):
+    by_roi = copy.by_roi("side-accuracy")
+    defined = [ROIS["chair"].index(roi) for roi in ("2b", "2f")]
+    assert set(np.flatnonzero(~np.isnan(by_roi))) <= set(defined)
+    values = copy.values("side-accuracy")
+    assert copy.mean("side-accuracy") == pytest.approx(np.nanmean(values))
 
-    def method(reference, target):
-        everything = np.arange(len(target.cloud))
-        return {roi: nothing if roi == "3" else everything for roi in reference.regions}
 
+def test_a_region_found_nowhere_is_counted_as_missed(benchmark):
+    def match(reference, regions, target):
+        everything = np.arange(len(target))
+        return {roi: everything[: 0 if roi == "3" else None] for roi in regions}
+
+    result = run_pair(match, "chair", *benchmark.objects[:2])
+    assert [roi for roi, count in result.points.items() if not count] == ["3"]
+    assert result.figures["3"]["cd-l1"] == 1.0 > result.figures["1"]["cd-l1"]
+    assert set(result.figures["3"]) == set(METRICS)
+
+
+def test_several_processes_find_the_same(benchmark, copy):
     told = []
-    result = evaluate("mine", method, objects, "chair", lambda *a: told.append(a))
-    assert (result.distance[:, ROIS["chair"].index("3")] == MISSED).all()
-    assert (result.distance < MISSED).sum() == 6 * 7
-    assert told == [(i, 6) for i in range(1, 7)]
+    results = evaluate(benchmark, [COPY, BOX], 2, progress=lambda *a: told.append(a))
+    assert [result.spec for result in results] == [COPY, BOX]
+    for metric in METRICS:
+        np.testing.assert_array_equal(results[0].values(metric), copy.values(metric))
+    assert told[:2] == [("copy", 0, 6), ("box", 0, 6)]
+    assert {("copy", 6, 6), ("box", 6, 6)} <= set(told) and len(told) == 2 + 12
 
 
-def test_the_table_has_a_row_for_each_method_and_for_what_is_published(copy):
-    lines = table([copy, copy], "chair").splitlines()
-    assert len(lines) == 2 + 2 + 3
-    assert (
-        lines[0] == "| chair: CD-L1 | 1 | 2b | 2f | 3 | 5b | 5r | 7b | 7r | **mean** | s a pair |"
-    )
-    assert f"| **{copy.mean:.4f}** |" in lines[2] and "snapped" in lines[2]
-    assert [cell.strip() for cell in lines[2].split("|")[2:10]] == [
-        f"{value:.3f}" for value in copy.distance.mean(0)
-    ]
-    assert "published NRDF (all 90 pairs)" in lines[-1] and "0.039" in lines[-1]
-    assert {line.count("|") for line in lines} == {12}
+def test_an_interrupted_evaluation_goes_on(benchmark, copy, tmp_path, monkeypatch):
+    runs = []
+    real = module.run_pair
+
+    def interrupted(*arguments):
+        if len(runs) == 4:
+            raise KeyboardInterrupt
+        runs.append(arguments)
+        return real(*arguments)
+
+    monkeypatch.setattr(module, "run_pair", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(benchmark, [COPY], store=PairStore(tmp_path))
+    monkeypatch.setattr(module, "run_pair", lambda *a: runs.append(a) or real(*a))
+    told = []
+    (result,) = evaluate(benchmark, [COPY], 1, PairStore(tmp_path), lambda *a: told.append(a))
+    assert len(runs) == 6 and told == [("copy", count, 6) for count in (4, 5, 6)]
+    for metric in METRICS:
+        np.testing.assert_array_equal(result.values(metric), copy.values(metric))
+    (again,) = evaluate(benchmark, [COPY], 1, PairStore(tmp_path))
+    assert len(runs) == 6 and again == result
+    evaluate(benchmark, [COPY], 1, PairStore(tmp_path, overwrite=True))
+    assert len(runs) == 12
 
 
-def test_results_are_written_with_their_convention(copy, tmp_path):
-    write_results([copy], "chair", "corrected", tmp_path / "new" / "results")
-    folder = tmp_path / "new" / "results"
-    assert sorted(path.name for path in folder.iterdir()) == [
-        "table2-chair-corrected.json",
-        "table2-chair-corrected.md",
-    ]
-    markdown = (folder / "table2-chair-corrected.md").read_text()
-    assert markdown == table([copy], "chair") + "\n"
-    content = json.loads((folder / "table2-chair-corrected.json").read_text())
-    assert content["convention"].startswith("Manhattan") and "summed" in content["convention"]
-    assert (content["labels"], content["published_mean"]) == ("corrected", PUBLISHED["chair"])
-    pairs = content["methods"]["copy"]["pairs"]
-    assert (pairs[1]["reference"], pairs[1]["target"]) == ("chair1", "chair3")
-    np.testing.assert_allclose([pair["cd_l1"] for pair in pairs], copy.distance, atol=1e-6)
+def test_what_a_method_raises_is_raised(benchmark, monkeypatch):
+    def fail(error):
+        def run(*arguments):
+            raise error
 
+        return run
 
-def test_a_place_that_cannot_be_written_is_refused(copy, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"cannot make .*file"):
-        write_results([copy], "chair", "published", tmp_path / "file")
+    monkeypatch.setattr(module, "run_pair", fail(ValueError("broken")))
+    with pytest.raises(ValueError, match="broken"):
+        evaluate(benchmark, [COPY])
+    monkeypatch.setattr(module, "run_pair", fail(RuntimeError(CRASHED)))
+    with pytest.raises(DataError, match=r"copy, chair1 to chair2: the process .* fewer --workers"):
+        evaluate(benchmark, [COPY])

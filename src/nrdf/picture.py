@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import ndimage
@@ -21,6 +21,9 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import OutputError
 from nrdf.geometry import canonical_transform, estimate_normals, thin
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 log = logging.getLogger(__name__)
 
@@ -87,6 +90,17 @@ def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> 
     region could hardly be seen. `size`: width of a panel in pixels. Takes about 0.2 s a panel.
     Raises OutputError if the file cannot be written.
     """
+    rows, colours = render_panels(panels, size)
+    _compose(rows, panels, colours, Path(path), size)
+
+
+def render_panels(
+    panels: Sequence[Panel], size: int
+) -> tuple[list[list[np.ndarray]], dict[str, np.ndarray]]:
+    """The pictures that `draw_regions` puts together, and each region's colour.
+
+    One row a view, in it an array (h, size, 3) in [0, 1] for each panel, all of the same scale.
+    """
     names = list(dict.fromkeys(name for panel in panels for name in panel.regions))
     colours = region_colours(names)
     drawn = [_prepare(panel, names) for panel in panels]
@@ -94,7 +108,7 @@ def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> 
     hidden = _hidden_regions(drawn, len(names))
     if hidden:
         rows.append(_row(drawn, colours, _best_side(drawn, hidden), size))
-    _compose(rows, panels, colours, Path(path), size)
+    return rows, colours
 
 
 @dataclass(frozen=True)
@@ -283,7 +297,6 @@ def _compose(
     """Panels with their titles above and the legend below, written to `path`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
 
     dpi = 100
     header = 62 if any(panel.note for panel in panels) else 40
@@ -302,16 +315,28 @@ def _compose(
         top -= row[0].shape[0]
         for i, image in enumerate(row):
             figure.figimage((image * 255).astype(np.uint8), xo=i * size, yo=top)
+    add_legend(figure, colours)
+    write_figure(figure, path, dpi)
+
+
+def add_legend(figure: Figure, colours: Mapping[str, np.ndarray]) -> None:
+    """Each region's name beside its colour, along the lower edge of a matplotlib figure."""
+    from matplotlib.patches import Patch
+
     if colours:
         figure.legend(
             handles=[Patch(color=tuple(colour), label=name) for name, colour in colours.items()],
             loc="lower center",
-            ncols=max(1, min(len(colours), width // 150)),
+            ncols=max(1, min(len(colours), int(figure.get_figwidth() / 1.5))),
             frameon=False,
             fontsize=11.5,
             handlelength=1.1,
             handleheight=1.1,
         )
+
+
+def write_figure(figure: Figure, path: Path, dpi: int) -> None:
+    """Write a matplotlib figure, whole or not at all. Raises OutputError if it cannot be."""
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix or '.png'}")
     try:
         figure.savefig(temporary, dpi=dpi, pil_kwargs={"compress_level": 4})

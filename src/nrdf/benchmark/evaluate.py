@@ -1,134 +1,142 @@
-"""Table II: every method on every ordered pair of BSRC, the paper's convention."""
+"""Table II: every method on every ordered pair of BSRC, in parallel, going on where it was."""
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
+from functools import lru_cache
 
 import numpy as np
 
-from nrdf.benchmark.bsrc import ROIS, BenchmarkObject, ordered_pairs
-from nrdf.benchmark.methods import DESCRIPTIONS, Method
-from nrdf.benchmark.metrics import chamfer_l1
-from nrdf.errors import OutputError
-from nrdf.ply import write_atomically
-
-MISSED = 1.0
-"""CD-L1 that a region found nowhere is counted with: about the object's own length."""
-
-PUBLISHED = {
-    "chair": {"NDF": 0.230, "IMDC": 0.063, "NRDF": 0.039},
-    "car": {"NDF": 0.194, "IMDC": 0.024, "NRDF": 0.019},
-    "plane": {"NDF": 0.142, "IMDC": 0.047, "NRDF": 0.035},
-}
-"""Mean CD-L1 of the paper's Table II, over all 90 pairs of a category."""
+from nrdf.benchmark.bsrc import Benchmark, BenchmarkObject
+from nrdf.benchmark.methods import Match, MethodSpec, build_method
+from nrdf.benchmark.metrics import score
+from nrdf.benchmark.store import PairResult, PairStore
+from nrdf.errors import DataError, NrdfError
+from nrdf.shapes.pool import CRASHED, each
 
 
 @dataclass(frozen=True)
 class MethodResult:
-    """One method's CD-L1 of every pair and region, and the seconds each pair took.
+    """One method's figures of every pair, in the order of the benchmark's pairs."""
 
-    pairs: (reference, target) names; distance: (pairs, regions); seconds: (pairs,).
-    """
-
-    method: str
-    pairs: list[tuple[str, str]]
+    spec: MethodSpec
     rois: tuple[str, ...]
-    distance: np.ndarray
-    seconds: np.ndarray
+    pairs: tuple[PairResult, ...]
+
+    def values(self, metric: str) -> np.ndarray:
+        """(pairs, regions) of one metric; NaN where it has no value."""
+        rows = [[pair.figures[roi][metric] for roi in self.rois] for pair in self.pairs]
+        return np.array(rows, dtype=float)
+
+    def by_roi(self, metric: str) -> np.ndarray:
+        """Mean over the pairs, (regions,); NaN for a region without values."""
+        return np.array([_mean(column) for column in self.values(metric).T])
+
+    def mean(self, metric: str = "cd-l1") -> float:
+        """Mean over all pairs and regions that have a value; NaN if none has."""
+        return _mean(self.values(metric).ravel())
 
     @property
-    def mean(self) -> float:
-        """Mean CD-L1 over all pairs and regions."""
-        return float(self.distance.mean())
+    def seconds(self) -> np.ndarray:
+        """Wall time of each pair, (pairs,)."""
+        return np.array([pair.seconds for pair in self.pairs])
+
+    @property
+    def missed(self) -> int:
+        """How many regions were found nowhere, over all pairs."""
+        return sum(not count for pair in self.pairs for count in pair.points.values())
+
+
+@dataclass(frozen=True)
+class _Task:
+    spec: MethodSpec
+    category: str
+    reference: BenchmarkObject
+    target: BenchmarkObject
 
 
 def evaluate(
-    name: str,
-    method: Method,
-    objects: list[BenchmarkObject],
-    category: str,
-    progress: Callable[[int, int], None] | None = None,
-) -> MethodResult:
-    """Run one method on all ordered pairs. `progress` is told (done, all).
+    benchmark: Benchmark,
+    specs: Sequence[MethodSpec],
+    workers: int = 1,
+    store: PairStore | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> list[MethodResult]:
+    """Run methods on all ordered pairs, on `workers` processes of one thread each.
 
-    A region that is found nowhere counts as `MISSED`.
+    With one worker everything runs in this process. Pairs that `store` has are not run again, and
+    each one that is done is added to it. `progress` is told (method, pairs done, all). Raises
+    whatever a method raises, and DataError if a process dies.
     """
-    pairs = ordered_pairs(objects)
-    rois = ROIS[category]
-    distance = np.full((len(pairs), len(rois)), MISSED)
-    seconds = np.zeros(len(pairs))
-    for number, (reference, target) in enumerate(pairs):
-        start = time.perf_counter()
-        found = method(reference, target)
-        seconds[number] = time.perf_counter() - start
-        for column, roi in enumerate(rois):
-            if len(found[roi]):
-                points = target.cloud.points[found[roi]]
-                distance[number, column] = chamfer_l1(points, target.regions[roi])
-        if progress is not None:
-            progress(number + 1, len(pairs))
-    names = [(reference.name, target.name) for reference, target in pairs]
-    return MethodResult(name, names, rois, distance, seconds)
-
-
-def table(results: Sequence[MethodResult], category: str) -> str:
-    """Markdown: a row a method, a column a region, and the published means below."""
-    rois = ROIS[category]
-    lines = [
-        f"| {category}: CD-L1 | {' | '.join(rois)} | **mean** | s a pair |",
-        "|---" * (len(rois) + 3) + "|",
-    ]
-    for result in results:
-        cells = " | ".join(f"{value:.3f}" for value in result.distance.mean(0))
-        lines.append(
-            f"| {result.method}: {DESCRIPTIONS[result.method]} | {cells} | **{result.mean:.4f}** "
-            f"| {np.median(result.seconds):.2f} |"
+    done: dict[tuple[str, str, str], PairResult] = {}
+    tasks = []
+    for spec in specs:
+        kept = store.open(benchmark, spec) if store else {}
+        for reference, target in benchmark.pairs:
+            names = (reference.name, target.name)
+            if names in kept:
+                done[(spec.name, *names)] = kept[names]
+            else:
+                tasks.append(_Task(spec, benchmark.category, reference, target))
+    total = len(benchmark.pairs)
+    counts = {spec.name: sum(key[0] == spec.name for key in done) for spec in specs}
+    tell = progress or (lambda *_: None)
+    for name, count in counts.items():
+        tell(name, count, total)
+    with closing(each(_run, tasks, min(workers, len(tasks)))) as results:
+        for task, result in results:
+            if isinstance(result, Exception):
+                raise _explained(task, result)
+            if store:
+                store.add(benchmark, task.spec, result)
+            done[task.spec.name, result.reference, result.target] = result
+            counts[task.spec.name] += 1
+            tell(task.spec.name, counts[task.spec.name], total)
+    return [
+        MethodResult(
+            spec,
+            benchmark.rois,
+            tuple(done[spec.name, reference.name, target.name] for reference, target in pairs),
         )
-    for name, mean in PUBLISHED[category].items():
-        lines.append(f"| published {name} (all 90 pairs) |{' |' * len(rois)} {mean:.3f} | |")
-    return "\n".join(lines)
+        for spec in specs
+        for pairs in [benchmark.pairs]
+    ]
 
 
-def write_results(
-    results: Sequence[MethodResult], category: str, labels: str, folder: Path
-) -> None:
-    """Write `table2-<category>-<labels>.md` and `.json` (every pair's figures) into `folder`.
+def run_pair(
+    match: Match, category: str, reference: BenchmarkObject, target: BenchmarkObject
+) -> PairResult:
+    """Find a reference's regions on a target and score them. Timed is the one call of `match`."""
+    start = time.perf_counter()
+    found = match(reference.cloud, reference.regions, target.cloud)
+    seconds = time.perf_counter() - start
+    figures = {roi: score(found[roi], target, roi, category) for roi in reference.regions}
+    points = {roi: len(found[roi]) for roi in reference.regions}
+    return PairResult(reference.name, target.name, seconds, points, figures)
 
-    Raises OutputError if the folder cannot be made or written.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
-    stem = folder / f"table2-{category}-{labels}"
-    markdown = table(results, category) + "\n"
-    write_atomically(stem.with_suffix(".md"), [markdown.encode("utf-8")])
-    content = {
-        "category": category,
-        "labels": labels,
-        "convention": "Manhattan nearest-neighbour distance, mean, summed over both directions",
-        "rois": ROIS[category],
-        "published_mean": PUBLISHED[category],
-        "methods": {
-            result.method: {
-                "mean": result.mean,
-                "pairs": [
-                    {
-                        "reference": reference,
-                        "target": target,
-                        "cd_l1": [round(float(value), 6) for value in row],
-                        "seconds": round(float(seconds), 4),
-                    }
-                    for (reference, target), row, seconds in zip(
-                        result.pairs, result.distance, result.seconds, strict=True
-                    )
-                ],
-            }
-            for result in results
-        },
-    }
-    write_atomically(stem.with_suffix(".json"), [json.dumps(content, indent=1).encode("utf-8")])
+
+def _run(task: _Task) -> PairResult:
+    return run_pair(
+        build_method(task.spec), task.category, _known(task.reference), _known(task.target)
+    )
+
+
+@lru_cache(maxsize=32)
+def _known(item: BenchmarkObject) -> BenchmarkObject:
+    """The first copy of an object that this process was sent, for methods to recognise it by."""
+    return item
+
+
+def _explained(task: _Task, error: Exception) -> Exception:
+    if isinstance(error, NrdfError) or str(error) != CRASHED:
+        return error
+    pair = f"{task.reference.name} to {task.target.name}"
+    return DataError(f"{task.spec.name}, {pair}: {CRASHED}; give fewer --workers")
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else float("nan")

@@ -1,144 +1,173 @@
-"""Every way of finding regions, behind one call: `method(reference, target) -> name to indices`.
+"""Every way of finding regions, behind one call, and where the learned ones' weights are.
 
-Indices are those of target points. A method that moves the region's own points gives the target
-point that each of them is snapped to, in their order, so a target point may occur several times and
-counts as often in CD-L1; one that finds a mask gives every point of it once.
+`match(reference, regions, target)` takes a cloud, regions of it by name (points (m, 3), indices
+(m,) or masks (n,)) and another cloud, and gives indices of the target's points by name. A method
+that moves the region's own points gives the target point that each of them is snapped to, in their
+order, so a target point may occur several times and counts as often in distances; one that finds a
+mask gives every point of it once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from nrdf.benchmark.bsrc import BenchmarkObject
-from nrdf.errors import ConfigError, unknown_name
-from nrdf.geometry import bounding_box, canonical_transform
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
-from nrdf.regions.model import Embedded, Model, Taught
-from nrdf.regions.region import region_indices
-from nrdf.shapes.registration import RegistrationTemplate
+from nrdf.cloud import PointCloud
+from nrdf.errors import ConfigError, ModelError, unknown_name
 
 Found = dict[str, np.ndarray]
-Method = Callable[[BenchmarkObject, BenchmarkObject], Found]
+Match = Callable[[PointCloud, Mapping[str, Any], PointCloud], Found]
 
-NAMES = (
-    "nrdf",
-    "nrdf-points",
-    "copy",
-    "box",
-    "copy-normals",
-    "box-normals",
-    "registration",
-)
-DESCRIPTIONS = {
-    "nrdf": "the field, region as a mask on the target (default)",
-    "nrdf-points": "the field, C's points snapped to the target (paper, eq. 9)",
-    "copy": "the reference's points, snapped",
-    "box": "scaled to the target's bounding box, snapped",
-    "copy-normals": "copy, snapped with oriented normals",
-    "box-normals": "box, snapped with oriented normals",
-    "registration": "smooth non-rigid registration with normals, region as a mask",
+
+@dataclass(frozen=True)
+class Entry:
+    """A method: what it is; for a learned one the preset of its weights, and what the folder of
+    its training run is called behind the category (None: the category's weights in the zoo)."""
+
+    description: str
+    preset: str | None = None
+    run: str | None = None
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether it needs weights."""
+        return self.preset is not None
+
+
+METHODS = {
+    "copy": Entry("the reference's points, snapped"),
+    "box": Entry("scaled to the target's bounding box, snapped"),
+    "copy-normals": Entry("copy, snapped with oriented normals"),
+    "box-normals": Entry("box, snapped with oriented normals"),
+    "registration": Entry("smooth non-rigid registration with normals, region as a mask"),
+    "ndf": Entry("NDF, nearest descriptor", "ndf", "ndf"),
+    "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
+    "imdc": Entry("IMDC, its inverse's points snapped", "imdc", "imdc"),
+    "nrdf-paper": Entry("NRDF as in the paper, C's points snapped (eq. 9)", "paper", "paper"),
+    "nrdf": Entry("the default field, region as a mask", "default"),
+    "nrdf-points": Entry("the default field, C's points snapped (eq. 9)", "default"),
 }
-_TEMPLATE_POINTS = 2048
+"""By name, in the order of the paper's table: nothing learned, rivals, ours."""
 
 
-def get_method(name: str, model: Model | None = None) -> Method:
-    """A method by its name; those of the field need its model. Raises ConfigError."""
-    if name not in NAMES:
-        raise ConfigError(unknown_name("method", name, NAMES))
-    if name.startswith("nrdf"):
-        if model is None:
-            raise ConfigError(f"method '{name}' needs the weights of a model (--model)")
-        return _FieldMethod(model, "points" if name == "nrdf-points" else "mask")
-    if name == "registration":
-        return _Registration()
-    return _Copied(box=name.startswith("box"), normals=name.endswith("normals"))
+@dataclass(frozen=True)
+class MethodSpec:
+    """All that a process needs to build a method; sha256 of the weight file, if there is one."""
+
+    name: str
+    weights: Path | None = None
+    sha256: str | None = None
+    device: str = "cpu"
 
 
-class _FieldMethod:
-    """The field, each object embedded once for all its pairs."""
+def find_methods(
+    names: Sequence[str],
+    category: str,
+    models: Sequence[str] = (),
+    runs: Path = Path("runs"),
+    device: str = "cpu",
+) -> list[MethodSpec]:
+    """The methods of some names, in their order, with the weights that they need for a category.
 
-    def __init__(self, model: Model, association: str) -> None:
-        self.model, self.association = model, association
-        self.taught: dict[str, Taught] = {}
-        self.embedded: dict[str, Embedded] = {}
+    models: METHOD=PATH for single methods, or a zoo name or path alone for those of the default
+    field. Weights of others are looked for in `runs`/CATEGORY-PRESET. Raises ConfigError for a name
+    that is not known or given twice, ModelError for weights that are not there or of another
+    category or preset, naming the file.
+    """
+    for name in names:
+        if name not in METHODS:
+            raise ConfigError(unknown_name("method", name, list(METHODS)))
+        if list(names).count(name) > 1:
+            raise ConfigError(f"method '{name}' is given twice; name each once")
+    if not names:
+        raise ConfigError(f"no method given; known: {', '.join(METHODS)}")
+    chosen = _chosen_models(models)
+    return [_find_method(name, category, chosen, runs, device) for name in names]
 
-    def __call__(self, reference: BenchmarkObject, target: BenchmarkObject) -> Found:
-        if reference.name not in self.taught:
-            self.taught[reference.name] = self.model.set_reference(reference.cloud)
-        if target.name not in self.embedded:
-            self.embedded[target.name] = self.model.embed(target.cloud)
-        matches = self.taught[reference.name].retrieve_all(
-            reference.regions, self.embedded[target.name], self.association
+
+def build_method(spec: MethodSpec) -> Match:
+    """The method that a spec describes; the last two are kept. Raises as reading weights does."""
+    return _build(spec)
+
+
+@lru_cache(maxsize=2)
+def _build(spec: MethodSpec) -> Match:
+    from nrdf.benchmark.baselines import Copied, Registered
+
+    entry = METHODS[spec.name]
+    if not entry.is_learned:
+        if spec.name == "registration":
+            return Registered()
+        return Copied(box=spec.name.startswith("box"), normals=spec.name.endswith("normals"))
+    import nrdf
+
+    model = nrdf.load_model(str(spec.weights), spec.device)
+    if entry.preset == "ndf":
+        from nrdf.benchmark.ndf import DescriptorSearch
+
+        return DescriptorSearch(model, energy=spec.name == "ndf-energy").match
+    from nrdf.benchmark.learned import FieldMatch
+
+    return FieldMatch(model, "mask" if spec.name == "nrdf" else "points")
+
+
+def _chosen_models(models: Sequence[str]) -> dict[str, str]:
+    """Method name to weights; the key "" for those of the default field."""
+    chosen = {}
+    for word in models:
+        name, equals, path = word.partition("=")
+        # A path may hold "=" too; it then has no method's name before it.
+        key, value = (name, path) if equals and name in METHODS else ("", word)
+        if key and not METHODS[key].is_learned:
+            raise ConfigError(f"method '{key}' learns nothing; it takes no --model")
+        chosen[key] = value
+    return chosen
+
+
+def _find_method(
+    name: str, category: str, chosen: Mapping[str, str], runs: Path, device: str
+) -> MethodSpec:
+    entry = METHODS[name]
+    if not entry.is_learned:
+        return MethodSpec(name)
+    from nrdf.field.weights import read_metadata
+    from nrdf.field.zoo import find_weights
+
+    if name in chosen:
+        path = find_weights(chosen[name])
+    elif entry.run is None:
+        path = find_weights(chosen.get("", category))
+    else:
+        path = _trained(name, entry, category, runs)
+    metadata = read_metadata(path)
+    for kind, wanted in (("category", category), ("preset", entry.preset)):
+        if metadata.get(kind) != wanted:
+            raise ModelError(
+                f"method '{name}' on category {category} needs weights of {kind} '{wanted}', but "
+                f"{path} holds {kind} '{metadata.get(kind)}'; give others with --model {name}=PATH"
+            )
+    return MethodSpec(name, path.resolve(), _sha256(path), device)
+
+
+def _trained(name: str, entry: Entry, category: str, runs: Path) -> Path:
+    from nrdf.field.zoo import WEIGHTS
+
+    run = runs / f"{category}-{entry.run}"
+    path = run / WEIGHTS
+    if not path.is_file():
+        raise ModelError(
+            f"no weights of method '{name}' for category {category}: expected {path}; train them "
+            f"(nrdf train {category} --preset {entry.run}-short --data data/{category} --out "
+            f"{run}), give the folder of the runs (--runs) or the file (--model {name}=PATH)"
         )
-        if self.association == "mask":
-            return {name: match.indices for name, match in matches.items()}
-        tree = cKDTree(target.cloud.points)
-        return {name: tree.query(match.points)[1] for name, match in matches.items()}
+    return path
 
 
-class _Copied:
-    """Nothing learned, nothing moved but the bounding box."""
-
-    def __init__(self, box: bool, normals: bool) -> None:
-        self.box, self.weight = box, NORMAL_WEIGHT if normals else 0.0
-
-    def __call__(self, reference: BenchmarkObject, target: BenchmarkObject) -> Found:
-        points = reference.cloud.points
-        if self.box:
-            low, high = bounding_box(points)
-            target_low, target_high = bounding_box(target.cloud.points)
-            points = (points - low) / (high - low) * (target_high - target_low) + target_low
-        regions, normals = _region_indices(reference), _normals(reference)
-        asked = np.concatenate(list(regions.values()))
-        index, _ = snap(
-            points[asked], normals[asked], target.cloud.points, _normals(target), self.weight
-        )
-        ends = np.cumsum([len(indices) for indices in regions.values()])
-        return dict(zip(regions, np.split(index, ends[:-1]), strict=True))
-
-
-class _Registration:
-    """Registration from every reference to every target, with the defaults of its module."""
-
-    def __init__(self) -> None:
-        # One at a time, because its kernels take hundreds of megabytes; pairs come by reference.
-        self.template: tuple[str, np.ndarray, RegistrationTemplate] | None = None
-
-    def __call__(self, reference: BenchmarkObject, target: BenchmarkObject) -> Found:
-        if self.template is None or self.template[0] != reference.name:
-            points, normals = _canonical(reference)
-            chosen = np.random.default_rng(0).permutation(len(points))[:_TEMPLATE_POINTS]
-            template = RegistrationTemplate(points[chosen], normals[chosen])
-            self.template = (reference.name, chosen, template)
-        _, chosen, template = self.template
-        points, normals = _canonical(target)
-        sample = np.random.default_rng(1).permutation(len(points))[: 2 * _TEMPLATE_POINTS]
-        mapped = template.register(points[sample], normals[sample])
-        asked, _ = voters(mapped.points, template.normals, points, normals, NORMAL_WEIGHT, VOTERS)
-        found = {}
-        for name, indices in _region_indices(reference).items():
-            member = np.zeros(len(reference.cloud.points), bool)
-            member[indices] = True
-            found[name] = np.flatnonzero(member[chosen][asked].mean(axis=1) > 0.5)
-        return found
-
-
-def _region_indices(item: BenchmarkObject) -> Found:
-    tree = cKDTree(item.cloud.points)
-    return {
-        name: region_indices(region, item.cloud, lambda: tree)
-        for name, region in item.regions.items()
-    }
-
-
-def _canonical(item: BenchmarkObject) -> tuple[np.ndarray, np.ndarray]:
-    centre, scale = canonical_transform(item.cloud.points)
-    return (item.cloud.points - centre) / scale, _normals(item)
-
-
-def _normals(item: BenchmarkObject) -> np.ndarray:
-    assert item.cloud.normals is not None  # read_bsrc estimates them
-    return item.cloud.normals
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

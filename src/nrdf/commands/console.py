@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import platform
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -61,6 +61,13 @@ class LogHandler(logging.Handler):
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
     """A callback (done, total) that draws a bar with the remaining time on a terminal."""
+    with progress_bars([what]) as update:
+        yield lambda done, total: update(what, done, total)
+
+
+@contextmanager
+def progress_bars(names: Sequence[str]) -> Iterator[Callable[[str, int, int], None]]:
+    """A callback (name, done, total) that draws a bar a name on a terminal."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -77,8 +84,8 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
         console=errors,
         disable=not errors.is_terminal,
     ) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        tasks = {name: progress.add_task(name, total=None) for name in names}
+        yield lambda name, done, total: progress.update(tasks[name], completed=done, total=total)
 
 
 def provenance(metadata: dict[str, Any]) -> dict[str, Any]:

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.console import console, errors, progress_bar, show, table, versions
+from nrdf.commands.console import (
+    command_line,
+    console,
+    errors,
+    progress_bar,
+    progress_bars,
+    show,
+    table,
+    versions,
+)
 
 if TYPE_CHECKING:
+    from nrdf.benchmark.bsrc import Benchmark
+    from nrdf.benchmark.evaluate import MethodResult
     from nrdf.benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
 
 
@@ -30,45 +42,94 @@ def bsrc(
     category: Literal["chair", "car", "plane"],
     out: Path | None = None,
     method: tuple[str, ...] = ("nrdf", "nrdf-points", "copy", "box"),
-    model: str | None = None,
+    model: tuple[str, ...] = (),
+    runs: Path = Path("runs"),
     labels: Literal["published", "corrected"] = "published",
+    metric: str = "cd-l1",
     device: str = "cpu",
+    workers: int | None = None,
+    overwrite: bool = False,
 ) -> None:
     """The paper's Table II: regions found on the benchmark's scans.
 
-    On the Benchmark for Surface Region Correspondence (BSRC). CD-L1 in the paper's convention: for
-    every point the Manhattan distance to its nearest neighbour in the other set, averaged, summed
-    over both directions. Lower is better.
+    On the Benchmark for Surface Region Correspondence (BSRC), every ordered pair of the objects
+    that are there. CD-L1 in the paper's convention: for every point the Manhattan distance to its
+    nearest neighbour in the other set, averaged, summed over both directions. Lower is better.
+    With --out also every other metric (docs/benchmark.md), as Markdown, CSV and JSON, and a
+    picture; interrupted, the same command goes on where it was.
+
+    Methods: copy, box, copy-normals, box-normals, registration (nothing learned); ndf, ndf-energy,
+    imdc, nrdf-paper (trained rivals); nrdf, nrdf-points (the default field).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
     Args:
         data: BSRC's folder, with Chair, Car and plane in it.
         category: chair, car or plane.
-        out: Folder for the table (Markdown) and every pair's figures (JSON).
-        method: nrdf, nrdf-points, copy, box, copy-normals, box-normals, registration.
-        model: Zoo name, weight file or run; the category's model in the zoo unless given.
+        out: Folder for tables, figures of every pair, and picture.
+        method: Methods to run, rows of the table.
+        model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
+            is for nrdf and nrdf-points, which otherwise have the category's model in the zoo.
+        runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
-        device: cpu, cuda, cuda:N or auto.
+        metric: Metric of the table: cd-l1, chamfer-l1, squared-cd, f-score-0.01, f-score-0.02,
+            precision, recall, iou or side-accuracy.
+        device: cpu, cuda, cuda:N or auto, of learned methods.
+        workers: Processes; all cores unless given.
+        overwrite: Start anew, whatever is in the folder.
     """
-    import nrdf
     from nrdf.benchmark.bsrc import read_bsrc
-    from nrdf.benchmark.evaluate import evaluate as run
-    from nrdf.benchmark.evaluate import table as markdown
-    from nrdf.benchmark.evaluate import write_results
-    from nrdf.benchmark.methods import get_method
+    from nrdf.benchmark.evaluate import evaluate
+    from nrdf.benchmark.methods import METHODS, build_method, find_methods
+    from nrdf.benchmark.metrics import METRICS
+    from nrdf.benchmark.store import PairStore
+    from nrdf.benchmark.table import write_results
+    from nrdf.errors import ConfigError, unknown_name
 
-    objects = read_bsrc(data, category, labels)
-    learned = any(name.startswith("nrdf") for name in method)
-    loaded = nrdf.load_model(model or category, device) if learned else None
-    methods = {name: get_method(name, loaded) for name in method}
-    results = []
-    for name, find in methods.items():
-        with progress_bar(name) as progress:
-            results.append(run(name, find, objects, category, progress))
-    if out is not None:
-        write_results(results, category, labels, out)
-    console.print(markdown(results, category))
+    if metric not in METRICS:
+        raise ConfigError(unknown_name("metric", metric, list(METRICS)))
+    specs = find_methods(method, category, model, runs, device)
+    with errors.status("reading the benchmark"):
+        benchmark = read_bsrc(data, category, labels)
+    workers = workers or os.cpu_count() or 1
+    store = None if out is None else PairStore(out, overwrite)
+    with progress_bars(method) as progress:
+        results = evaluate(benchmark, specs, workers, store, progress)
+    _show_table(results, benchmark, metric)
+    if out is None:
+        return
+    from nrdf.benchmark.figure import draw_comparison
+    from nrdf.training.provenance import git_commit
+
+    origin = {
+        "versions": versions(),
+        "commit": git_commit(),
+        "cores": os.cpu_count(),
+        "workers": workers,
+        "command": command_line(),
+    }
+    written = write_results(results, benchmark, metric, out, origin)
+    drawn = next((spec for spec in specs if METHODS[spec.name].is_learned), specs[0])
+    corrected = "" if labels == "published" else f"-{labels}"
+    written.append(out / f"figure-{category}{corrected}.png")
+    with errors.status("drawing"):
+        draw_comparison(benchmark, drawn.name, build_method(drawn), written[-1])
+    console.print("wrote " + ", ".join(str(path) for path in written))
+
+
+def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) -> None:
+    from nrdf.benchmark.table import caption, cells, headings, rows
+
+    title, formula = caption(benchmark, metric)
+    shown = table(title, "", *headings(benchmark))
+    shown.padding = (0, 1, 0, 0)  # eight regions fit into 80 columns
+    shown.columns[0].no_wrap = True
+    for row in rows(results, benchmark, metric):
+        shown.add_row(row.name, *cells(row, metric), style=None if row.seconds else "dim")
+    show(shown)
+    if metric == "cd-l1":
+        console.print("published: all 90 pairs of a category, fields trained on other data")
+    console.print(formula)
 
 
 def families(

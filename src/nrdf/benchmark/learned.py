@@ -1,0 +1,36 @@
+"""Methods of a trained field: one forward pass a pair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.cloud import PointCloud
+from nrdf.regions.model import Model, Taught
+
+
+class FieldMatch:
+    """A field with an inverse: ours of either preset, or IMDC's.
+
+    association: "mask", or "points": C's prediction of each region point, snapped to the nearest
+    target point by position alone (paper, eq. 9). The last reference stays taught, as in use: a
+    target is embedded in every call.
+    """
+
+    def __init__(self, model: Model, association: str) -> None:
+        self.model, self.association = model, association
+        self._taught: Taught | None = None
+
+    def __call__(
+        self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud
+    ) -> dict[str, np.ndarray]:
+        if self._taught is None or self._taught.reference.cloud is not reference:
+            self._taught = self.model.set_reference(reference)
+        matches = self._taught.retrieve_all(regions, target, self.association)
+        if self.association == "mask":
+            return {name: match.indices for name, match in matches.items()}
+        tree = cKDTree(target.points)
+        return {name: tree.query(match.points)[1] for name, match in matches.items()}
