@@ -14,6 +14,7 @@ from nrdf.training.config import TrainConfig, load_config
 
 
 class TinyConfig(FieldConfig):
+    encoder_points: int = 256
     width: int = 16
     dropout: float = 0.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +23,7 @@ def ablate(
     labels: Literal["published", "corrected"] = "published",
     pairs: int = 20,
     device: str = "auto",
+    workers: int | None = None,
     out: Path | None = None,
     overwrite: bool = False,
 ) -> None:
@@ -54,13 +56,14 @@ def ablate(
         labels: BSRC's, as published, or corrected.
         pairs: Pairs of parametric shapes, without --bsrc.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
+        workers: Processes that score on BSRC; all cores unless given.
         out: Folder of the runs and the table; runs/ablate-CATEGORY unless given.
         overwrite: Train anew what the folder holds of these variants and the shared stages.
     """
     import nrdf
-    from nrdf.benchmark import ablation
-    from nrdf.benchmark.bsrc import ordered_pairs, read_bsrc
-    from nrdf.benchmark.methods import get_method
+    from nrdf.benchmark import ablation, ablation_table
+    from nrdf.benchmark.bsrc import read_bsrc
+    from nrdf.benchmark.learned import FieldMatch
     from nrdf.training.config import load_config
     from nrdf.training.data import load_bank
     from nrdf.training.distributed import choose_device
@@ -68,13 +71,13 @@ def ablate(
 
     out = out or Path("runs") / f"ablate-{category}"
     settings = load_config(config or ablation.SCHEDULES[schedule])
-    chosen = choose_device(device)
+    chosen, cores = choose_device(device), workers or os.cpu_count() or 1
     # Read before anything is trained: what is wrong with it should not show hours later.
     if bsrc is not None:
-        tested = ordered_pairs(read_bsrc(bsrc, category, labels))
-        ground = f"{len(tested)} ordered pairs of BSRC, labels {labels}"
+        benchmark = read_bsrc(bsrc, category, labels)
+        ground = f"BSRC, {benchmark.describe()}"
     else:
-        tested = ablation.family_pairs(category, pairs)
+        cases = ablation_table.family_cases(category, pairs)
         ground = f"the named regions of {pairs} pairs of parametric shapes, none of them trained on"
 
     runs = ablation.train_variants(
@@ -87,13 +90,18 @@ def ablate(
     for variant, run in runs.items():
         model = nrdf.load_model(run, str(chosen))
         with progress_bar(ablation.describe(variant)) as progress:
-            regions = ablation.score(get_method("nrdf-points", model), tested, progress)
-        validation = ablation.validation_losses(model.field, bank) if bank else {}
+            if bsrc is None:
+                regions = ablation_table.score(FieldMatch(model, "points"), cases, progress)
+            else:
+                regions = ablation_table.benchmark_scores(
+                    benchmark, run, str(chosen), cores, lambda _, *counts: progress(*counts)
+                )
+        validation = ablation_table.validation_losses(model.field, bank) if bank else {}
         seconds = ablation.read_cost(run)
         results.append(
-            ablation.VariantResult(variant, regions, validation, seconds, model.metadata)
+            ablation_table.VariantResult(variant, regions, validation, seconds, model.metadata)
         )
-    found = ablation.Ablation(
+    found = ablation_table.Ablation(
         category,
         schedule if config is None else config.stem,
         ground,
