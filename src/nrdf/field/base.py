@@ -44,6 +44,8 @@ class Field(nn.Module, ABC):
 
     preset: ClassVar[str]
     Config: ClassVar[type[FieldConfig]]
+    inverts: ClassVar[bool] = True
+    """Whether there is an inverse descriptor function; without, `invert` raises ModelError."""
 
     def __init__(self, config: FieldConfig | None = None) -> None:
         super().__init__()

@@ -20,7 +20,8 @@ def validate(field: Field, bank: Bank) -> dict[str, float]:
     `val/error`: mean distance between predicted and known corresponding points (canonical
     lengths); `val/copy`: that of leaving every point where it is; `val/iou`: intersection over
     union of predicted and true occupancy over the queries. With several pools, the error of each
-    as well. Scores that the shapes give no ground for are left out.
+    as well. Scores that the shapes give no ground for are left out, and errors of a field without
+    an inverse.
     """
     training = {module: module.training for module in field.modules()}
     field.eval()
@@ -50,12 +51,14 @@ def _sums(field: Field, pool: Bank) -> dict[str, float]:
     for step in range(STEPS):
         batch = pool.batch(size, seed=0, step=step)
         z = field.embed(batch.points, batch.normals)
-        found = field.transfer(
-            z[batch.reference], batch.source, batch.source_normals, z[batch.partner]
-        ).points
-        sums["error"] += float(((found - batch.target).norm(dim=-1) * batch.weight).sum())
-        sums["copy"] += float(((batch.source - batch.target).norm(dim=-1) * batch.weight).sum())
-        sums["weight"] += float(batch.weight.sum())
+        if field.inverts:
+            found = field.transfer(
+                z[batch.reference], batch.source, batch.source_normals, z[batch.partner]
+            ).points
+            apart, copied = found - batch.target, batch.source - batch.target
+            sums["error"] += float((apart.norm(dim=-1) * batch.weight).sum())
+            sums["copy"] += float((copied.norm(dim=-1) * batch.weight).sum())
+            sums["weight"] += float(batch.weight.sum())
         guess, truth = field.occupancy(z, batch.queries) > 0, batch.occupancy > 0.5
         sums["inside"] += float((guess & truth).sum())
         sums["either"] += float((guess | truth).sum())
