@@ -31,11 +31,9 @@ def ablate(
 
     One training for each loss left out, and one with all of them: same seed, same budget, and the
     stages before the last trained once for all. Killed at any moment, the same command goes on;
-    what is trained is not trained again. Two commands with the same folder share the work, each
-    with some of the variants; a last one without --only prints the whole table:
-
-    nrdf ablate chair --data data/chair --only complete cd emd
-    nrdf ablate chair --data data/chair --only ncd ds dd
+    what is trained is not trained again. Two commands with the same folder share the work, one with
+    --only complete cd emd, the other with --only ncd ds dd; a last one without --only prints the
+    whole table.
 
     The score is the mean CD-L1 of the paper's convention, by the paper's eq. 9: on BSRC where its
     folder is given, else on the named regions of parametric shapes that no training set holds.
