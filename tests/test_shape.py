@@ -159,7 +159,7 @@ def test_processes_find_what_one_finds(data, untrained, results):
 
 def test_results_are_written_with_every_shape(results, tmp_path):
     shown = table(results, "chair", SMALL)
-    assert shown.startswith("| chair, 2 shapes not trained on | CD-L1 | MSE | empty |")
+    assert shown.startswith("| chair, 2 shapes | CD-L1 | MSE | empty |")
     assert f"| `nrdf` | **{results[0].cd_l1:.4f}** | **{results[0].mse:.4f}** |" in shown
     assert "Grid of 16³ nodes" in shown and "Manhattan" in shown
     empty = [shape.name for shape in results[0].shapes if shape.is_empty]

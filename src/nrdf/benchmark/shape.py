@@ -228,7 +228,7 @@ def table(results: Sequence[ShapeResult], category: str, settings: Settings) -> 
     """Markdown: a row a method, the published ones below, and how the figures are made."""
     shapes = results[0].shapes
     lines = [
-        f"| {category}, {len(shapes)} shapes not trained on | CD-L1 | MSE | empty |",
+        f"| {category}, {len(shapes)} shapes | CD-L1 | MSE | empty |",
         "|---|---|---|---|",
     ]
     for result in results:
