@@ -56,6 +56,13 @@ def test_the_development_half_is_called_so(root):
         (chairs / f"chair{number}").symlink_to(chairs / "chair1")
     (chairs / "chair2").rename(root / "chair2")
     assert "of chair (the development half), 20" in read_bsrc(root, "chair").describe()
+    for number in (2, 4, 6, 8, 10):
+        (chairs / f"chair{number}").symlink_to(chairs / "chair1")
+    assert (
+        read_bsrc(root, "chair")
+        .describe()
+        .endswith("9, 10 of chair (the whole benchmark), 90 ordered pairs, labels as published")
+    )
 
 
 def test_objects_are_equal_if_all_their_files_are(root):

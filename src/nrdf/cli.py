@@ -77,13 +77,18 @@ def run(given: list[str], verbose: bool = False) -> int:
         _complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        resumable = given[0] in RESUMABLE or " ".join(given[:2]) in RESUMABLE
-        _complain("interrupted" + "; the same command goes on where it was" * resumable)
+        _complain("interrupted" + "; the same command goes on where it was" * _resumable(given))
         return 130
     except BrokenPipeError:
         # The reader of our output has gone (`nrdf info | head`): nothing more to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def _resumable(given: list[str]) -> bool:
+    # What `nrdf eval` measures is kept only where there is a folder for it.
+    kept = given[0] not in GROUPS or any(word.partition("=")[0] == "--out" for word in given)
+    return kept and (given[0] in RESUMABLE or " ".join(given[:2]) in RESUMABLE)
 
 
 def _parse(given: list[str]) -> int | None:

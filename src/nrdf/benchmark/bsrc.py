@@ -122,6 +122,7 @@ class Benchmark:
     def describe(self) -> str:
         """Which objects, pairs and labels a table is of, in words."""
         half = " (the development half)" if tuple(self.numbers) == DEVELOPMENT else ""
+        half = half if self.missing else " (the whole benchmark)"
         read = "labels as published" if self.labels == "published" else "labels corrected"
         absent = f"; not there: {_listed(self.missing)}" if self.missing else ""
         return (

@@ -82,15 +82,19 @@ def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
 
 
 def _in_process(work: Callable[[Task], Result], task: Task) -> Result:
+    # Told to end at work, by an exception, so files are tidied up; elsewhere (while it imports what
+    # the work needs) at once, because there the exception would be reported with a traceback.
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     try:
         return work(task)
-    except SystemExit:  # told to end; the pool would go on with the next task
+    except SystemExit:  # the pool would go on with the next task
         os._exit(1)
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _take_signals() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides what to do
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # an exception, so files are tidied up
 
 
 @contextmanager
