@@ -18,8 +18,12 @@ from test_model import SMALL
 
 SIZES = {
     "default": SMALL,
+    "ndf": {
+        "encoder_points": 128, "centres": 32, "neighbours": 8, "edge_channels": 8, "hidden": 8,
+        "encoder_blocks": 1, "latent": 8, "decoder_width": 8, "decoder_blocks": 1,
+    },
     "imdc": {"encoder_points": 256, "implicit_widths": (32, 16), "inverse_width": 16},
-}
+}  # fmt: skip
 
 
 def save(path: Path, preset: str = "default", category: str = "chair") -> Path:
@@ -87,7 +91,7 @@ def test_what_cannot_be_asked_for_is_refused():
         find_methods(["nrdf"], "chair", ["nothing.safetensors"])
 
 
-@pytest.mark.parametrize("name", ["nrdf", "nrdf-points", "imdc", "copy", "box-normals"])
+@pytest.mark.parametrize("name", ["nrdf", "nrdf-points", "imdc", "ndf", "copy", "box-normals"])
 def test_every_method_answers_the_same_call(name, tmp_path):
     (points, regions), (other, _) = member_clouds("chair", (0, 1))
     preset = METHODS[name].preset

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,10 +29,9 @@ def evaluations() -> dict[str, Callable[..., Any]]:
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
-    found: dict[str, Callable[..., Any]] = {"bsrc": bsrc, "families": families}
-    if find_spec("nrdf.commands.evaluate_shape"):
-        found["shape"] = import_module("nrdf.commands.evaluate_shape").shape
-    return found
+    from nrdf.commands.evaluate_shape import shape
+
+    return {"bsrc": bsrc, "families": families, "shape": shape}
 
 
 def bsrc(
@@ -66,7 +63,7 @@ def bsrc(
     Args:
         data: BSRC's folder, with Chair, Car and plane in it.
         category: chair, car or plane.
-        out: Folder for tables, figures of every pair, and picture.
+        out: Folder for tables, figures of every pair, and a picture of the best learned method.
         method: Methods to run, rows of the table.
         model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
             is for nrdf and nrdf-points, which otherwise have the category's model in the zoo.
@@ -109,7 +106,8 @@ def bsrc(
         "command": command_line(),
     }
     written = write_results(results, benchmark, metric, out, origin)
-    drawn = next((spec for spec in specs if METHODS[spec.name].is_learned), specs[0])
+    learned = [result for result in results if METHODS[result.spec.name].is_learned]
+    drawn = min(learned or results[:1], key=lambda result: result.mean()).spec
     corrected = "" if labels == "published" else f"-{labels}"
     written.append(out / f"figure-{category}{corrected}.png")
     with errors.status("drawing"):
