@@ -26,9 +26,12 @@ class DescriptorSearch:
     """Region points by the nearest descriptor among the target's own points, or by energy.
 
     energy: instead minimise the L1 distance between descriptors over free points by `STEPS` of
-    Adam from `STARTS` random target points, as its authors do; the best start wins and is snapped
-    to the target. Nearest descriptors are compared by Euclidean distance, which a matrix product
-    gives; the energy is L1.
+    Adam from `STARTS` random target points, as its authors do for the points of a gripper; the best
+    start wins and is snapped to the target. Nearest descriptors are compared by Euclidean distance,
+    which a matrix product gives; the energy is L1.
+
+    For 5600 region points and a target of 8192 points, on one core of a 2023 server CPU: nearest
+    descriptors 0.7 s, energy about a minute (0.15 s for each of `STARTS` times `STEPS`).
     """
 
     def __init__(self, model: Model, energy: bool = False) -> None:
@@ -72,8 +75,9 @@ class DescriptorSearch:
             points = self._tensor(start).requires_grad_()
             optimizer = torch.optim.Adam([points], RATE)
             for _ in range(STEPS):
-                optimizer.zero_grad()
-                self._energy(z, points, wanted).sum().backward()
+                # Not backward(), which would leave gradients on the model's weights.
+                energy = self._energy(z, points, wanted).sum()
+                points.grad = torch.autograd.grad(energy, points)[0]
                 optimizer.step()
             with torch.no_grad():
                 energy = self._energy(z, points, wanted)
@@ -94,5 +98,8 @@ class DescriptorSearch:
 
 def nearest(wanted: Tensor, among: Tensor) -> np.ndarray:
     """For each descriptor (m, d) the index (m,) of the nearest of others (n, d)."""
+    # What all have in common would drown the differences in the product's rounding.
+    common = among.mean(dim=0)
+    wanted, among = wanted - common, among - common
     parts = [torch.cdist(part, among).argmin(dim=1) for part in wanted.split(_CHUNK)]
     return torch.cat(parts).cpu().numpy()
