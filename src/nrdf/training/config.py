@@ -116,7 +116,7 @@ class TrainConfig(Strict):
     optimizer: OptimizerConfig = OptimizerConfig()
     seed: int = Field(default=0, ge=0)
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
-    """auto: bfloat16 where it pays (CUDA; CPUs with AMX)."""
+    """auto: bfloat16 where it pays (CUDA; CPUs with AMX or AVX-512 BF16)."""
     ema: float | None = Field(default=None, gt=0, lt=1)
     """Decay of the moving average of the weights, which is what is exported; None: no average."""
     checkpoint_every: int = Field(default=500, ge=1)
