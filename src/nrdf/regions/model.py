@@ -6,7 +6,7 @@ A `Model` embeds clouds; a `Taught` is one reference with its descriptors, and r
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, explained_by, snap, voters
 from nrdf.regions.region import region_indices
 
 METHODS = ("mask", "points")
@@ -27,9 +27,9 @@ WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
 _CHUNK = 8192  # points described or inverted at a time
-# Chosen on unseen family chairs, so that confidence is about the share of points that are right.
-_DISTANCE_SCALE = 0.4  # canonical distance to the mapped point at which trust has fallen to 1/e
-_ERROR_SCALE = 0.2  # the same, of the error that the field expects of itself
+# Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
+# and of the error that the field expects of itself.
+_TRUST_SCALE = 0.2
 
 
 @dataclass(frozen=True)
@@ -103,12 +103,19 @@ class Match:
 
 
 class Mapped(NamedTuple):
-    """Reference points on a target, canonical: points (m, 3), normals (m, 3), trust (m,) in [0, 1]
-    (that the place exists, and how small an error the field expects)."""
+    """Reference points on a target, canonical: points (m, 3), normals (m, 3), existence (m,) in
+    [0, 1] (does the target have such a place?), error (m,) that the field expects; 1 and 0 for a
+    field that says nothing of the kind."""
 
     points: np.ndarray
     normals: np.ndarray
-    trust: np.ndarray
+    existence: np.ndarray
+    error: np.ndarray
+
+    @property
+    def trust(self) -> np.ndarray:
+        """(m,) in [0, 1]: that the place exists, and how small an error is expected."""
+        return self.existence * np.exp(-self.error / _TRUST_SCALE)
 
 
 class Model:
@@ -190,7 +197,9 @@ class Taught:
 
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
         method: "mask" maps the whole reference and lets each target point ask the mapped
-        reference points nearest in position and normal; "points" snaps C's prediction of each
+        reference points nearest in position and normal; a target point that is far from all of
+        them, by the error that the field expects, has no counterpart and is in no region. "points"
+        snaps C's prediction of each
         region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
         gets no majority anywhere: use "points" for spots.
 
@@ -236,13 +245,18 @@ class Taught:
         asked, distance = voters(
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
-        trust = mapped.trust[asked] * np.exp(-distance / _DISTANCE_SCALE)
+        trust = mapped.trust[asked] * np.exp(-distance / _TRUST_SCALE)
+        explained = explained_by(distance, mapped.error[asked])
         matches = {}
         for name, indices in chosen.items():
             member = self._working_mask(indices)[asked]
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
-            index, follows = target.to_all(votes > 0.5)
+            voted = votes > 0.5
+            found = voted & explained
+            # Where much was voted in that nothing on the reference explains, the rest is doubtful.
+            confidence *= found.sum() / max(voted.sum(), 1)
+            index, follows = target.to_all(found)
             whole = self.reference.is_whole
             arrived = mapped.points[indices] if whole else self.map_points(indices, target).points
             matches[name] = Match(
@@ -261,7 +275,7 @@ class Taught:
         start = time.perf_counter()
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(nearest, return_index=True)
-        trust = mapped.trust * np.exp(-distance / _DISTANCE_SCALE)
+        trust = mapped.trust * np.exp(-distance / _TRUST_SCALE)
         target.seconds["associate"] = time.perf_counter() - start
         return Match(
             indices=target.working[found],
@@ -305,21 +319,23 @@ class Taught:
                     Mapped(
                         inverse.points[0].cpu().numpy(),
                         own if inverse.normals is None else inverse.normals[0].cpu().numpy(),
-                        _trust(inverse.existence, inverse.log_error, len(own)),
+                        _or_constant(inverse.existence, torch.sigmoid, 1.0, len(own)),
+                        _or_constant(inverse.log_error, torch.exp, 0.0, len(own)),
                     )
                 )
         return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _trust(
-    existence: torch.Tensor | None, log_error: torch.Tensor | None, count: int
+def _or_constant(
+    values: torch.Tensor | None,
+    function: Callable[[torch.Tensor], torch.Tensor],
+    constant: float,
+    count: int,
 ) -> np.ndarray:
-    trust = torch.ones(count)
-    if existence is not None:
-        trust = trust * existence[0].sigmoid().cpu()
-    if log_error is not None:
-        trust = trust * torch.exp(-log_error[0].exp().cpu() / _ERROR_SCALE)
-    return trust.numpy()
+    """A function of what a field says (1, count), or a constant where it says nothing: (count,)."""
+    if values is None:
+        return np.full(count, constant, np.float32)
+    return function(values[0]).cpu().numpy()
 
 
 def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
