@@ -56,7 +56,7 @@ def bsrc(
     picture; interrupted, the same command goes on where it was.
 
     Methods: copy, box, copy-normals, box-normals, registration (nothing learned); ndf, ndf-energy,
-    imdc, nrdf-paper (trained rivals); nrdf, nrdf-points (the default field).
+    imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default field).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
@@ -66,7 +66,7 @@ def bsrc(
         out: Folder for tables, figures of every pair, and a picture of the best learned method.
         method: Methods to run, rows of the table.
         model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
-            is for nrdf and nrdf-points, which otherwise have the category's model in the zoo.
+            is for those of the default field, which otherwise have the category's model in the zoo.
         runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
         metric: Metric of the table: cd-l1, chamfer-l1, squared-cd, f-score-0.01, f-score-0.02,

@@ -29,6 +29,7 @@ def retrieve(
     target: Path,
     out: Path,
     method: Literal["mask", "points"] = "mask",
+    refine: bool = False,
     device: str = "cpu",
     overwrite: bool = False,
 ) -> None:
@@ -54,6 +55,8 @@ def retrieve(
         out: Folder to write; made if missing.
         method: mask: each target point asks the mapped reference points nearest to it;
             points: each region point's prediction is snapped to the target (the paper's).
+        refine: Move the mapped reference onto the target in a few steps first, about half a second
+            more.
         device: cpu, cuda, cuda:N or auto.
         overwrite: Replace an earlier result in the output folder.
     """
@@ -72,7 +75,7 @@ def retrieve(
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
         embedded = loaded.embed(target_cloud)
-        matches = taught.retrieve_all(regions, embedded, method)
+        matches = taught.retrieve_all(regions, embedded, method, refine)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
         panels = [
@@ -86,6 +89,7 @@ def retrieve(
             "command": command_line(),
             "model": provenance(loaded.metadata),
             "method": method,
+            "refine": refine,
             "reference": describe_cloud(reference, reference_cloud),
             "target": describe_cloud(target, target_cloud),
             "coordinates": "the target file's own frame and unit",

@@ -7,19 +7,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, explained_by, snap, voters
+from nrdf.regions.embedded import Embedded, encoder_subset
+from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 
 METHODS = ("mask", "points")
@@ -30,54 +31,6 @@ _CHUNK = 8192  # points described or inverted at a time
 # Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
 # and of the error that the field expects of itself.
 _TRUST_SCALE = 0.2
-
-
-@dataclass(frozen=True)
-class Embedded:
-    """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
-
-    cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
-    canonical. centre (3,), scale: canonical = (original - centre) / scale. z: (1, d_z).
-    seconds: time of each phase.
-    """
-
-    cloud: PointCloud
-    working: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-    centre: np.ndarray
-    scale: float
-    z: torch.Tensor
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    def original(self, points_canonical: np.ndarray) -> np.ndarray:
-        """Canonical points (m, 3) in the cloud's own frame and unit."""
-        return np.asarray(points_canonical, np.float64) * self.scale + self.centre
-
-    def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Selected working points as indices of the whole cloud, and which working point each
-        follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
-        """
-        index = np.flatnonzero(selected[self.nearest_working])
-        return index, self.nearest_working[index]
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether every point of the cloud is in use."""
-        return len(self.working) == len(self.cloud.points)
-
-    @cached_property
-    def nearest_working(self) -> np.ndarray:
-        """The position in `working` of the point nearest to each point of the cloud."""
-        if self.is_whole:
-            return self.working
-        points = (self.cloud.points - self.centre) / self.scale
-        return cKDTree(self.points).query(points)[1]
-
-    @cached_property
-    def tree(self) -> cKDTree:
-        """The cloud's own points, for regions that are given as points."""
-        return cKDTree(self.cloud.points)
 
 
 @dataclass(frozen=True)
@@ -105,12 +58,17 @@ class Match:
 class Mapped(NamedTuple):
     """Reference points on a target, canonical: points (m, 3), normals (m, 3), existence (m,) in
     [0, 1] (does the target have such a place?), error (m,) that the field expects; 1 and 0 for a
-    field that says nothing of the kind."""
+    field that says nothing of the kind. moved: (m, 3), how far refinement has moved the points."""
 
     points: np.ndarray
     normals: np.ndarray
     existence: np.ndarray
     error: np.ndarray
+    moved: np.ndarray
+
+    def shifted(self, moved: np.ndarray) -> Mapped:
+        """The same, moved by (m, 3)."""
+        return self._replace(points=self.points + moved, moved=self.moved + moved)
 
     @property
     def trust(self) -> np.ndarray:
@@ -186,12 +144,26 @@ class Taught:
         self.reference = reference
         self._k = self._describe(reference.points, reference.normals)
 
-    def retrieve(self, region: Any, target: PointCloud | Embedded, method: str = "mask") -> Match:
+    @cached_property
+    def _refiner(self) -> Refiner:
+        return Refiner(self.reference.points, self.reference.normals)
+
+    def retrieve(
+        self,
+        region: Any,
+        target: PointCloud | Embedded,
+        method: str = "mask",
+        refine: bool = False,
+    ) -> Match:
         """Find one region on a target: `retrieve_all` for a single region."""
-        return self.retrieve_all({"region": region}, target, method)["region"]
+        return self.retrieve_all({"region": region}, target, method, refine)["region"]
 
     def retrieve_all(
-        self, regions: Mapping[str, Any], target: PointCloud | Embedded, method: str = "mask"
+        self,
+        regions: Mapping[str, Any],
+        target: PointCloud | Embedded,
+        method: str = "mask",
+        refine: bool = False,
     ) -> dict[str, Match]:
         """Find regions on a target, which is embedded and mapped once for all of them.
 
@@ -202,6 +174,8 @@ class Taught:
         snaps C's prediction of each
         region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
         gets no majority anywhere: use "points" for spots.
+        refine: move the mapped reference onto the target in a few steps of smooth registration
+        (`nrdf.regions.refine`), about half a second a target.
 
         Raises RegionError for a region that is empty or not on the reference (the message names
         it) or an unknown method, and CloudError for a target as `Model.embed` does.
@@ -215,32 +189,50 @@ class Taught:
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self.model.embed(target)
+        surface = self.map_surface(embedded, refine)
         if method == "mask":
-            return self._by_mask(chosen, embedded)
-        return {name: self._by_points(indices, embedded) for name, indices in chosen.items()}
+            return self._by_mask(chosen, embedded, surface)
+        return {
+            name: self._by_points(self.map_points(indices, embedded, surface), embedded)
+            for name, indices in chosen.items()
+        }
 
-    def map_surface(self, target: Embedded) -> Mapped:
+    def map_surface(self, target: Embedded, refine: bool = False) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
-        return self._invert(target, self._k, self.reference.normals)
+        start = time.perf_counter()
+        mapped = self._invert(target, self._k, self.reference.normals)
+        target.seconds["map"] = time.perf_counter() - start
+        if refine:
+            start = time.perf_counter()
+            moved = self._refiner.displacement(
+                mapped.points, mapped.normals, target.points, target.normals
+            )
+            mapped = mapped.shifted(moved)
+            target.seconds["refine"] = time.perf_counter() - start
+        return mapped
 
-    def map_points(self, indices: np.ndarray, target: Embedded) -> Mapped:
-        """Where reference points given by their indices (m,) in the cloud arrive on a target."""
+    def map_points(
+        self, indices: np.ndarray, target: Embedded, surface: Mapped | None = None
+    ) -> Mapped:
+        """Where reference points given by their indices (m,) in the cloud arrive on a target.
+
+        surface: what `map_surface` gave for the target, to follow it where it has been refined.
+        """
         reference = self.reference
         if reference.is_whole:
+            if surface is not None:
+                return Mapped(*(values[indices] for values in surface))
             return self._invert(target, self._k[:, indices], reference.normals[indices])
         points = (reference.cloud.points[indices] - reference.centre) / reference.scale
+        nearest = reference.nearest_working[indices]
         given = reference.cloud.normals
-        normals = (
-            given[indices]
-            if given is not None
-            else reference.normals[reference.nearest_working[indices]]
-        )
-        return self._invert(target, self._describe(points, normals), normals)
+        normals = reference.normals[nearest] if given is None else given[indices]
+        mapped = self._invert(target, self._describe(points, normals), normals)
+        return mapped if surface is None else mapped.shifted(surface.moved[nearest])
 
-    def _by_mask(self, chosen: dict[str, np.ndarray], target: Embedded) -> dict[str, Match]:
-        start = time.perf_counter()
-        mapped = self.map_surface(target)
-        target.seconds["map"] = time.perf_counter() - start
+    def _by_mask(
+        self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped
+    ) -> dict[str, Match]:
         start = time.perf_counter()
         asked, distance = voters(
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
@@ -257,21 +249,17 @@ class Taught:
             # Where much was voted in that nothing on the reference explains, the rest is doubtful.
             confidence *= found.sum() / max(voted.sum(), 1)
             index, follows = target.to_all(found)
-            whole = self.reference.is_whole
-            arrived = mapped.points[indices] if whole else self.map_points(indices, target).points
+            arrived = self.map_points(indices, target, mapped)
             matches[name] = Match(
                 indices=index,
-                points=target.original(arrived),
+                points=target.original(arrived.points),
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
         target.seconds["associate"] = time.perf_counter() - start
         return matches
 
-    def _by_points(self, indices: np.ndarray, target: Embedded) -> Match:
-        start = time.perf_counter()
-        mapped = self.map_points(indices, target)
-        target.seconds["map"] = time.perf_counter() - start
+    def _by_points(self, mapped: Mapped, target: Embedded) -> Match:
         start = time.perf_counter()
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(nearest, return_index=True)
@@ -321,6 +309,7 @@ class Taught:
                         own if inverse.normals is None else inverse.normals[0].cpu().numpy(),
                         _or_constant(inverse.existence, torch.sigmoid, 1.0, len(own)),
                         _or_constant(inverse.log_error, torch.exp, 0.0, len(own)),
+                        np.zeros((len(own), 3), np.float32),
                     )
                 )
         return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
@@ -336,11 +325,3 @@ def _or_constant(
     if values is None:
         return np.full(count, constant, np.float32)
     return function(values[0]).cpu().numpy()
-
-
-def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of the points that the encoder sees: an even subset of `count`, which always holds
-    the extreme points of each axis, so that the embedding knows the bounding box exactly."""
-    chosen = thin(points, count, np.random.default_rng(0))
-    extremes = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
-    return np.union1d(chosen, extremes)
