@@ -9,10 +9,6 @@ NORMAL_WEIGHT = 0.1
 """Canonical length that one unit of normal difference counts for: tells thin sides apart."""
 VOTERS = 7
 """Mapped reference points that each target point asks."""
-# How far a target point may be from the mapped reference and still have a counterpart on it:
-# canonical length, and multiple of the error that the field expects there.
-_SLACK = 0.02
-_REACH = 1.75
 
 
 # Trees are asked by one thread: an interrupt would free the arrays under scipy's other threads.
@@ -61,14 +57,3 @@ def voters(
         k=np.arange(1, min(count, len(mapped)) + 1),
     )
     return index, distance
-
-
-def explained_by(distance: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which target points (n,) have a counterpart on the reference, and not a part of their own, as
-    a spoiler or a canard is.
-
-    distance: (n, count) to the mapped points that each asked (`voters`); error: (n, count) that the
-    field expects of these. Where it expects none, it says nothing of the kind and explains all.
-    """
-    expected = error.mean(axis=1)
-    return (distance.mean(axis=1) <= _SLACK + _REACH * expected) | (expected == 0)

@@ -18,8 +18,9 @@ from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, explained_by, snap, voters
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
 from nrdf.regions.embedded import Embedded, encoder_subset
+from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 
@@ -169,9 +170,9 @@ class Taught:
 
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
         method: "mask" maps the whole reference and lets each target point ask the mapped
-        reference points nearest in position and normal; a target point that is far from all of
-        them, by the error that the field expects, has no counterpart and is in no region. "points"
-        snaps C's prediction of each
+        reference points nearest in position and normal; parts of the target that are far from all
+        of them, by the error that the field expects, join a region only where they grow out of it
+        (`nrdf.regions.patches`). "points" snaps C's prediction of each
         region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
         gets no majority anywhere: use "points" for spots.
         refine: move the mapped reference onto the target in a few steps of smooth registration
@@ -238,14 +239,14 @@ class Taught:
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
         trust = mapped.trust[asked] * np.exp(-distance / _TRUST_SCALE)
-        explained = explained_by(distance, mapped.error[asked])
+        patches = find_patches(target.points, explained_by(distance, mapped.error[asked]))
         matches = {}
         for name, indices in chosen.items():
             member = self._working_mask(indices)[asked]
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
             voted = votes > 0.5
-            found = voted & explained
+            found = patches.joined(voted)
             # Where much was voted in that nothing on the reference explains, the rest is doubtful.
             confidence *= found.sum() / max(voted.sum(), 1)
             index, follows = target.to_all(found)
