@@ -231,7 +231,7 @@ def test_the_order_of_points_does_not_matter(reference):
     with torch.no_grad():
         for parameter in model.field.parameters():
             parameter.add_(0.03 * torch.randn_like(parameter))
-    model = build_doubtful()
+        model.field.inverse.leave.bias[7] = 1.0  # log error: it knows that it is far off
     cloud, masks = reference
     target, _ = chair(seed=5)
     first = model.set_reference(cloud).retrieve(masks["seat"], target)
