@@ -23,6 +23,7 @@ class FieldMatch:
 
     def __init__(self, model: Model, association: str, refine: bool = False) -> None:
         self.model, self.association, self.refine = model, association, refine
+        self.confidence: dict[str, float] = {}
         self._taught: Taught | None = None
 
     def __call__(
@@ -31,6 +32,7 @@ class FieldMatch:
         if self._taught is None or self._taught.reference.cloud is not reference:
             self._taught = self.model.set_reference(reference)
         matches = self._taught.retrieve_all(regions, target, self.association, self.refine)
+        self.confidence = {name: match.score for name, match in matches.items()}
         if self.association == "mask":
             return {name: match.indices for name, match in matches.items()}
         tree = cKDTree(target.points)

@@ -4,7 +4,8 @@
 (m,) or masks (n,)) and another cloud, and gives indices of the target's points by name. A method
 that moves the region's own points gives the target point that each of them is snapped to, in their
 order, so a target point may occur several times and counts as often in distances; one that finds a
-mask gives every point of it once.
+mask gives every point of it once. A method that knows how sure it is has `confidence`, by name, of
+its last call.
 """
 
 from __future__ import annotations

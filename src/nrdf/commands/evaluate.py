@@ -116,7 +116,7 @@ def bsrc(
 
 
 def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) -> None:
-    from nrdf.benchmark.table import caption, cells, headings, rows
+    from nrdf.benchmark.table import caption, cells, confidence_lines, headings, rows
 
     title, formula = caption(benchmark, metric)
     shown = table(title, "", *headings(benchmark))
@@ -128,6 +128,8 @@ def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) 
     if metric == "cd-l1":
         console.print("published: all 90 pairs of a category, fields trained on other data")
     console.print(formula)
+    for line in confidence_lines(results):
+        console.print(line)
 
 
 def families(
