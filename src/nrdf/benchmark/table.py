@@ -123,8 +123,8 @@ def confidence_lines(results: Sequence[MethodResult]) -> list[str]:
         if quarters is not None:
             sure, unsure = quarters
             lines.append(
-                f"confidence of {result.spec.name}: mean CD-L1 {sure:.4f} in the quarter of regions of highest "
-                f"confidence, {unsure:.4f} in the quarter of lowest"
+                f"confidence of {result.spec.name}: mean CD-L1 {sure:.4f} in the quarter of "
+                f"regions of highest confidence, {unsure:.4f} in the quarter of lowest"
             )
     return lines
 
