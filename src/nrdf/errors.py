@@ -37,6 +37,10 @@ class TrainingError(NrdfError):
     """A training run that cannot go on: losses that stay infinite or undefined."""
 
 
+class ProcessError(NrdfError):
+    """Process knowledge, a tool path or a job that cannot be used."""
+
+
 class OutputError(NrdfError):
     """An output folder that is not empty, or that cannot be written."""
 
