@@ -1,13 +1,20 @@
-"""Tool paths: what planning produces, reports judge, and exports write."""
+"""Tool paths: what planning produces, reports judge, and exports write; and their file."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
 
 from nrdf.errors import ProcessError
 from nrdf.ply import write_atomically
@@ -15,7 +22,7 @@ from nrdf.ply import write_atomically
 VERSION = 1
 FILE = "toolpaths.json"
 SegmentKind = Literal["approach", "process", "departure"]
-_LARGEST_FILE = 1 << 29
+_LARGEST_FILE = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -29,7 +36,7 @@ class Segment:
         along the tool's axis *into* the part, tool x along the travel, tool y completes a
         right-handed frame.
     feed_m_s: speed of the tool centre point.
-    force_n: contact force along tool z, or None where nothing is touched.
+    force_n: contact force along tool z, at least 0, or None where nothing is touched.
     dwell_s: pause at the segment's last waypoint.
     """
 
@@ -71,3 +78,165 @@ class Job:
     category: str
     frame: str
     paths: tuple[ToolPath, ...]
+
+
+def read_job(folder: str | Path) -> Job:
+    """The job that `write_job` left in a folder (or the path of its file itself).
+
+    Raises ProcessError where there is none, where it is larger than 256 MiB, where a newer version
+    wrote it, and for a field that is missing, unknown or impossible, naming it.
+    """
+    path = Path(folder)
+    if path.is_dir() or not path.exists():
+        path = path / FILE
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise ProcessError(
+                f"{path} is larger than {_LARGEST_FILE >> 20} MiB: no file of tool paths"
+            )
+        text = path.read_bytes()
+    except OSError as error:
+        raise ProcessError(
+            f"cannot read the tool paths {path}: {error.strerror or error}; give the folder that "
+            "`nrdf transfer` wrote"
+        ) from None
+    return _parse(text, str(path))
+
+
+def write_job(folder: str | Path, job: Job) -> Path:
+    """Write `job` into an existing folder; the file's path. `read_job` gives exactly the same back.
+
+    Raises ProcessError, naming the field, for what `read_job` would refuse, and OutputError where
+    the folder cannot be written.
+    """
+    path = Path(folder) / FILE
+    content = {"version": VERSION, **_plain(job)}
+    try:
+        text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    except (TypeError, ValueError) as error:
+        raise ProcessError(f"tool paths that no JSON file can hold: {error}") from None
+    encoded = text.encode()
+    _parse(encoded, "the job")
+    write_atomically(path, [encoded + b"\n"])
+    return path
+
+
+_KEYS = {"positions": "positions_m"}
+"""Fields whose name in the file says the unit that the docstring says here."""
+
+
+def _plain(value: Any) -> Any:
+    """A job or a part of it as JSON has it."""
+    if isinstance(value, (Job, ToolPath, Segment)):
+        names = [item.name for item in fields(value)]
+        return {_KEYS.get(name, name): _plain(getattr(value, name)) for name in names}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _printable(name: str) -> str:
+    # Names end up in robot programs, where a line break would begin a new statement.
+    if not name.isprintable():
+        raise ValueError("a name with line breaks or other characters that cannot be printed")
+    return name
+
+
+def _unit(quaternion: tuple[float, ...]) -> tuple[float, ...]:
+    length = sum(x * x for x in quaternion) ** 0.5
+    if abs(length - 1.0) > 1e-6:
+        raise ValueError(f"a quaternion of length {length:.6g}, not 1")
+    return quaternion
+
+
+_Name = Annotated[str, Field(min_length=1, max_length=200), AfterValidator(_printable)]
+_Position = tuple[float, float, float]
+_Quaternion = Annotated[tuple[float, float, float, float], AfterValidator(_unit)]
+_AtLeastZero = Annotated[float, Field(ge=0)]
+_AboveZero = Annotated[float, Field(gt=0)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class _Version(BaseModel):
+    version: int
+
+
+class _SegmentContent(_Strict):
+    kind: SegmentKind
+    line: int = Field(ge=0)
+    positions_m: list[_Position] = Field(min_length=1)
+    quaternions_xyzw: list[_Quaternion]
+    feed_m_s: _AboveZero
+    force_n: _AtLeastZero | None = None
+    dwell_s: _AtLeastZero = 0.0
+
+    def made(self, where: str) -> Segment:
+        if len(self.positions_m) != len(self.quaternions_xyzw):
+            raise ProcessError(
+                f"{where} has {len(self.positions_m)} positions_m, but "
+                f"{len(self.quaternions_xyzw)} quaternions_xyzw; each position needs one"
+            )
+        content = {name: getattr(self, name) for name in type(self).model_fields}
+        positions = np.array(content.pop("positions_m"), dtype=np.float64)
+        content["quaternions_xyzw"] = np.array(content["quaternions_xyzw"], dtype=np.float64)
+        return Segment(positions=positions, **content)
+
+
+class _PathContent(_Strict):
+    region: _Name
+    process: _Name
+    tool: _Name
+    tool_radius_m: _AboveZero
+    segments: list[_SegmentContent]
+    spindle_rad_s: _AtLeastZero | None = None
+    parameters: dict[str, Any] = {}
+
+    def made(self, where: str) -> ToolPath:
+        content = {name: getattr(self, name) for name in type(self).model_fields}
+        segments = enumerate(content.pop("segments"))
+        made = tuple(segment.made(f"{where}.segments[{i}]") for i, segment in segments)
+        return ToolPath(segments=made, **content)
+
+
+class _JobContent(_Version, _Strict):
+    category: _Name
+    frame: _Name
+    paths: list[_PathContent]
+
+
+def _parse(text: bytes, origin: str) -> Job:
+    try:
+        version = _Version.model_validate_json(text).version
+        if version > VERSION:
+            raise ProcessError(
+                f"{origin} has version {version}; this nrdf reads versions up to {VERSION}: "
+                "update nrdf, or write the job again with this one"
+            )
+        content = _JobContent.model_validate_json(text)
+    except ValidationError as error:
+        shown = [_explain(dict(item)) for item in error.errors(include_url=False)[:5]]
+        raise ProcessError(f"{origin}: " + "; ".join(shown)) from None
+    paths = (path.made(f"{origin}: paths[{i}]") for i, path in enumerate(content.paths))
+    return Job(content.category, content.frame, tuple(paths))
+
+
+def _explain(item: dict[str, Any]) -> str:
+    """One pydantic complaint as field, fault and value."""
+    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"])
+    value = f" (it is {item['input']!r})" if isinstance(item["input"], (int, float, str)) else ""
+    if item["type"] in ("json_invalid", "missing"):
+        value = ""
+    elif len(value) > 60:
+        value = f"{value[:56]} ...)"
+    message = item["msg"].removeprefix("Value error, ")
+    if item["type"] == "extra_forbidden":
+        message = "no such field in a file of tool paths"
+    where = where.removeprefix(".") + ": " if where else ""
+    return f"{where}{message}{value}"
