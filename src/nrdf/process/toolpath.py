@@ -11,18 +11,19 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
-    ConfigDict,
     Field,
     ValidationError,
 )
 
 from nrdf.errors import ProcessError
 from nrdf.ply import write_atomically
+from nrdf.strict import Location, Strict, explain
 
 VERSION = 1
 FILE = "toolpaths.json"
 SegmentKind = Literal["approach", "process", "departure"]
 _LARGEST_FILE = 1 << 28
+_MOST_COMPLAINTS = 5
 
 
 @dataclass(frozen=True)
@@ -160,15 +161,11 @@ _AtLeastZero = Annotated[float, Field(ge=0)]
 _AboveZero = Annotated[float, Field(gt=0)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
 class _Version(BaseModel):
     version: int
 
 
-class _SegmentContent(_Strict):
+class _SegmentContent(Strict):
     kind: SegmentKind
     line: int = Field(ge=0)
     positions_m: list[_Position] = Field(min_length=1)
@@ -189,7 +186,7 @@ class _SegmentContent(_Strict):
         return Segment(positions=positions, **content)
 
 
-class _PathContent(_Strict):
+class _PathContent(Strict):
     region: _Name
     process: _Name
     tool: _Name
@@ -205,10 +202,16 @@ class _PathContent(_Strict):
         return ToolPath(segments=made, **content)
 
 
-class _JobContent(_Version, _Strict):
+class _JobContent(_Version, Strict):
     category: _Name
     frame: _Name
     paths: list[_PathContent]
+
+
+def _place(location: Location) -> str:
+    """paths[0].segments[2].feed_m_s"""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return "".join(parts).removeprefix(".")
 
 
 def _parse(text: bytes, origin: str) -> Job:
@@ -221,22 +224,7 @@ def _parse(text: bytes, origin: str) -> Job:
             )
         content = _JobContent.model_validate_json(text)
     except ValidationError as error:
-        shown = [_explain(dict(item)) for item in error.errors(include_url=False)[:5]]
-        raise ProcessError(f"{origin}: " + "; ".join(shown)) from None
+        lines = explain(error, _JobContent, _place)[:_MOST_COMPLAINTS]
+        raise ProcessError(f"{origin}: " + "; ".join(lines)) from None
     paths = (path.made(f"{origin}: paths[{i}]") for i, path in enumerate(content.paths))
     return Job(content.category, content.frame, tuple(paths))
-
-
-def _explain(item: dict[str, Any]) -> str:
-    """One pydantic complaint as field, fault and value."""
-    where = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in item["loc"])
-    value = f" (it is {item['input']!r})" if isinstance(item["input"], (int, float, str)) else ""
-    if item["type"] in ("json_invalid", "missing"):
-        value = ""
-    elif len(value) > 60:
-        value = f"{value[:56]} ...)"
-    message = item["msg"].removeprefix("Value error, ")
-    if item["type"] == "extra_forbidden":
-        message = "no such field in a file of tool paths"
-    where = where.removeprefix(".") + ": " if where else ""
-    return f"{where}{message}{value}"
