@@ -193,7 +193,7 @@ class _PathContent(Strict):
     tool_radius_m: _AboveZero
     segments: list[_SegmentContent]
     spindle_rad_s: _AtLeastZero | None = None
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = Field(default_factory=dict)
 
     def made(self, where: str) -> ToolPath:
         content = {name: getattr(self, name) for name in type(self).model_fields}
