@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from nrdf.commands.console import command_line, console, provenance, show, table, versions
-from nrdf.errors import RegionError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,11 +61,12 @@ def retrieve(
         clock = Clock()
         import nrdf
         from nrdf.picture import draw_regions
+        from nrdf.regions.files import read_regions
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
         reference_cloud, target_cloud = nrdf.read_cloud(reference), nrdf.read_cloud(target)
-        regions = read_regions(region)
+        regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
@@ -113,48 +112,6 @@ class Clock:
     @property
     def total(self) -> float:
         return sum(self.seconds.values())
-
-
-def read_regions(paths: tuple[Path, ...]) -> dict[str, np.ndarray]:
-    """Regions by name from files: points (m, 3), masks (n,) or indices (m,).
-
-    Raises RegionError for no file, arrays that cannot be read, names that occur twice or cannot be
-    file names, and CloudError for unreadable clouds.
-    """
-    regions: dict[str, np.ndarray] = {}
-    if not paths:
-        raise RegionError("no region given; name at least one file after --region")
-    for path in paths:
-        for name, values in _read_region_file(path).items():
-            if name in regions:
-                raise RegionError(f"two regions are called '{name}'; rename one of the files")
-            if not re.fullmatch(r"\w[\w .+-]*", name):
-                raise RegionError(
-                    f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
-                    "any of . + - _ are allowed, because it becomes a file name"
-                )
-            regions[name] = values
-    return regions
-
-
-def _read_region_file(path: Path) -> dict[str, np.ndarray]:
-    import zipfile
-
-    import numpy as np
-
-    from nrdf.cloud import read_cloud
-
-    if path.suffix.lower() in (".npy", ".npz"):
-        try:
-            with open(path, "rb") as file:
-                loaded = np.load(file, allow_pickle=False)
-                if isinstance(loaded, np.ndarray):
-                    return {path.stem: loaded}
-                if "points" not in loaded:
-                    return {name: loaded[name] for name in loaded.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise RegionError(f"cannot read the region file {path}: {error}") from None
-    return {path.stem: read_cloud(path).points}
 
 
 def reference_indices(
