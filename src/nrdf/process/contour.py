@@ -1,0 +1,139 @@
+"""Lines that follow a region's border: contour-parallel rings and spirals."""
+
+from __future__ import annotations
+
+import contourpy
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from nrdf.process.grid import Grid
+from nrdf.process.patch import Patch
+from nrdf.process.raster import Stroke
+
+
+def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
+    """Closed rings at even distances from a patch's border, from the outside in.
+
+    One list for each connected part of the patch inside its margin. Each ring starts where the one
+    before it ended, and all run the same way round.
+    """
+    parts = []
+    for rings, _, _ in _rings(patch, stepover_m, margin_m):
+        ordered: list[Stroke] = []
+        end = rings[0][0][0]
+        for level in rings:
+            waiting = list(level)
+            while waiting:
+                nearest = int(np.argmin([np.linalg.norm(r - end, axis=1).min() for r in waiting]))
+                ordered.append(_started_near(waiting.pop(nearest), end))
+                end = ordered[-1][0]
+        parts.append(ordered)
+    return parts
+
+
+def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
+    """Spirals from a patch's border inwards, one stroke for each chain of nested rings.
+
+    The first ring is followed whole, then each turn leads from one ring to the next inside it, and
+    the innermost is followed whole. Where rings split, each branch has a spiral of its own.
+    """
+    parts = []
+    for rings, grid, depth in _rings(patch, stepover_m, margin_m):
+        slope = np.stack(np.gradient(depth, grid.pitch)[::-1], axis=-1)
+        strokes, end = [], rings[0][0][0]
+        for chain in _chains(rings, stepover_m):
+            strokes.append(_wound(chain, grid, depth, slope, stepover_m, end))
+            end = strokes[-1][-1]
+        parts.append(strokes)
+    return parts
+
+
+def _rings(
+    patch: Patch, stepover: float, margin: float
+) -> list[tuple[list[list[Stroke]], Grid, np.ndarray]]:
+    """For each part: rings by level from outside in, closed, anticlockwise; grid; depth on it."""
+    grid = Grid.around(patch.uv, 0.5 * patch.spacing, 2.0 * patch.spacing)
+    clear = patch.border.clearance(grid.nodes, margin)
+    clear = np.maximum(clear, -grid.pitch)
+    parts, count = ndimage.label(clear > 0.0, np.ones((3, 3)))
+    found = []
+    for part in range(1, count + 1):
+        near = ndimage.binary_dilation(parts == part, np.ones((3, 3)), iterations=2)
+        depth = ndimage.gaussian_filter(np.where(near, clear, -grid.pitch), 1.0)
+        deepest = float(depth.max())
+        number = int(np.floor(max(deepest - 0.5 * patch.spacing, 0.0) / stepover)) + 1
+        first = 0.5 * max(deepest - stepover * (number - 1), 0.0)
+        levels = first + stepover * np.arange(number)
+        generator = contourpy.contour_generator(z=depth)
+        rings = [
+            [_anticlockwise(grid.origin + grid.pitch * line) for line in generator.lines(level)]
+            for level in levels
+        ]
+        rings = [level for level in rings if level]
+        if rings:
+            found.append((rings, grid, depth))
+    return found
+
+
+def _anticlockwise(ring: Stroke) -> Stroke:
+    x, y = ring.T
+    area = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
+    return ring if area > 0.0 else ring[::-1]
+
+
+def _started_near(ring: Stroke, place: np.ndarray) -> Stroke:
+    """A closed ring turned so that it begins, and ends, at its point nearest to `place` (2,)."""
+    k = int(np.argmin(np.linalg.norm(ring[:-1] - place, axis=1)))
+    turned = np.roll(ring[:-1], -k, axis=0)
+    return np.concatenate([turned, turned[:1]])
+
+
+def _chains(rings: list[list[Stroke]], stepover: float) -> list[list[Stroke]]:
+    """Rings that lie one inside the other without a branch, each list from the outside in."""
+    chains: list[list[Stroke]] = []
+    ends: list[int] = []  # the chain that each ring of the level before is the end of
+    before: list[Stroke] = []
+    for level in rings:
+        trees = [cKDTree(ring) for ring in before]
+        parents = []
+        for ring in level:
+            away = [float(np.median(tree.query(ring)[0])) for tree in trees]
+            parents.append(int(np.argmin(away)) if away and min(away) < 1.5 * stepover else -1)
+        now = []
+        for ring, parent in zip(level, parents, strict=True):
+            if parent >= 0 and parents.count(parent) == 1:
+                chains[ends[parent]].append(ring)
+                now.append(ends[parent])
+            else:
+                now.append(len(chains))
+                chains.append([ring])
+        ends, before = now, level
+    return chains
+
+
+def _wound(
+    chain: list[Stroke],
+    grid: Grid,
+    depth: np.ndarray,
+    slope: np.ndarray,
+    stepover: float,
+    end: np.ndarray,
+) -> Stroke:
+    """One stroke along a chain of rings, each turn sinking by a stepover."""
+    ring = _started_near(chain[0], end)
+    pieces = [ring]
+    for inner in chain[1:]:
+        walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+        wanted = grid.sample(depth, ring) + stepover * walked / walked[-1]
+        turn = ring
+        for _ in range(4):
+            by = np.stack([grid.sample(slope[..., a], turn) for a in (0, 1)], axis=-1)
+            steep = np.maximum((by**2).sum(axis=1), 0.25)
+            missing = wanted - grid.sample(depth, turn)
+            turn = turn + by * (missing / steep)[:, None]
+        pieces.append(turn[1:])
+        ring = _started_near(inner, turn[-1])
+    if len(chain) > 1:
+        pieces.append(ring)
+    return np.concatenate(pieces)
