@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contourpy
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
@@ -97,10 +96,8 @@ def _balance(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def _outline(grid: Grid, field: np.ndarray) -> np.ndarray:
     """Points (m, 2), a third of the grid's pitch apart, of the lines on which the field is 0."""
-    lines = contourpy.contour_generator(z=field).lines(0.0)
-    if not lines:
-        return np.empty((0, 2))
     # A contour has a point on every edge of the grid that it crosses.
     shares = np.arange(3)[:, None, None] / 3.0
+    lines = grid.contours(field, 0.0)
     fine = [(line[:-1] + shares * np.diff(line, axis=0)).reshape(-1, 2) for line in lines]
-    return grid.origin + grid.pitch * np.concatenate(fine)
+    return np.concatenate([np.empty((0, 2)), *fine])

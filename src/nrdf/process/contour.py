@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contourpy
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
@@ -65,11 +64,7 @@ def _rings(
         number = int(np.floor(max(deepest - 0.5 * patch.spacing, 0.0) / stepover)) + 1
         first = 0.5 * max(deepest - stepover * (number - 1), 0.0)
         levels = first + stepover * np.arange(number)
-        generator = contourpy.contour_generator(z=depth)
-        rings = [
-            [_anticlockwise(grid.origin + grid.pitch * line) for line in generator.lines(level)]
-            for level in levels
-        ]
+        rings = [[_anticlockwise(r) for r in grid.contours(depth, level)] for level in levels]
         rings = [level for level in rings if level]
         if rings:
             found.append((rings, grid, depth))

@@ -59,7 +59,11 @@ def tool_quaternions(
 ) -> np.ndarray:
     """Unit quaternions (n, 4), x y z w, of `lean` on `surface_frames`, without jumps of sign."""
     frames = lean(surface_frames(travel, normals), lead_rad, tilt_rad)
-    quaternions = Rotation.from_matrix(frames).as_quat()
+    return steady(Rotation.from_matrix(frames).as_quat())
+
+
+def steady(quaternions: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) of the same rotations, their signs chosen so that none jumps."""
     same = np.einsum("na,na->n", quaternions[1:], quaternions[:-1]) >= 0.0
     sign = np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])
     return quaternions * sign[:, None]

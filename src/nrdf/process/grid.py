@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import contourpy
 import numpy as np
+from contourpy import LineType
 from scipy import ndimage
 
 MOST_CELLS = 500
@@ -39,9 +41,9 @@ class Grid:
     def density(self, uv: np.ndarray, sigma: float, values: np.ndarray | None = None) -> np.ndarray:
         """Points `uv` (n, 2), weighed with `values` (n,), per area, blurred by `sigma` (m)."""
         column, row = np.rint((uv - self.origin) / self.pitch).astype(int).T
-        count = np.bincount(row * self.shape[1] + column, values, self.shape[0] * self.shape[1])
-        count = count.reshape(self.shape) / self.pitch**2
-        return ndimage.gaussian_filter(count, sigma / self.pitch, mode="constant")
+        rows, columns = self.shape
+        count = np.bincount(row * columns + column, values, rows * columns).reshape(self.shape)
+        return ndimage.gaussian_filter(count / self.pitch**2, sigma / self.pitch, mode="constant")
 
     def smooth(self, uv: np.ndarray, values: np.ndarray, sigma: float) -> np.ndarray:
         """`values` (n,) at `uv` (n, 2) as a smooth field, carried on beyond the points."""
@@ -54,3 +56,8 @@ class Grid:
         """A field's values at `uv` (..., 2), linear between nodes, the nearest beyond the rim."""
         place = np.moveaxis((uv - self.origin) / self.pitch, -1, 0)[::-1]
         return ndimage.map_coordinates(field, place, order=order, mode="nearest")
+
+    def contours(self, field: np.ndarray, level: float) -> list[np.ndarray]:
+        """Lines (m, 2) on which a field has a value; closed ones end where they begin."""
+        lines = contourpy.contour_generator(z=field, line_type=LineType.Separate).lines(level)
+        return [self.origin + self.pitch * np.asarray(line) for line in lines]

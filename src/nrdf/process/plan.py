@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.contour import contour, spiral
-from nrdf.process.frames import tool_quaternions, travel_of
+from nrdf.process.frames import steady, surface_frames, tool_quaternions, travel_of
 from nrdf.process.patch import Patch, patches_of
 from nrdf.process.raster import Stroke, raster
 from nrdf.process.surface import Surface, unit
@@ -103,8 +103,8 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     for strokes_of in _sweeps(patches, strategy):
         sweep: list[list[Line]] = []
         for patch, parts in strokes_of:
-            lines = iter(_lines(surface, patch, [s for part in parts for s in part], strategy))
-            sweep += [[next(lines) for _ in part] for part in parts]
+            found = iter(_lines(surface, patch, [s for part in parts for s in part], strategy))
+            sweep += [[next(found) for _ in part] for part in parts]
         blocks += _nearest_first(sweep)
     if not blocks:
         deepest = max(float(p.border.distance(p.border.grid.nodes).max()) for p in patches)
@@ -112,13 +112,48 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
             f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
             f"innermost place is {deepest:.3g} m from its border; give less than that"
         )
-    driven = [line for block in blocks for line in block]
+    contacts = [line.contacts for block in blocks for line in block]
+    normals = [line.normals for block in blocks for line in block]
+    return drive(_held(contacts, normals, strategy), normals, strategy)
+
+
+def drive(
+    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+    normals: Sequence[np.ndarray],
+    strategy: Strategy,
+) -> tuple[Segment, ...]:
+    """Segments that drive given lines, in that order, with approach and retract.
+
+    lines: positions (n, 3), m, of the tool centre point, and quaternions_xyzw (n, 4), for each;
+    normals: (n, 3), outward, of the surface under each. Every second pass drives the lines
+    backwards, the tool turned half around the normal.
+    """
     segments: list[Segment] = []
-    for number in range(strategy.passes):
-        lines = driven if number % 2 == 0 else [line.reversed() for line in driven[::-1]]
-        for line in lines:
-            segments += _segments(line, len(segments) and segments[-1].line + 1, strategy)
+    number = 0
+    for index in range(strategy.passes):
+        order = range(len(lines)) if index % 2 == 0 else range(len(lines) - 1, -1, -1)
+        for k in order:
+            (positions, quaternions), outward = lines[k], normals[k]
+            if index % 2:
+                positions, outward = positions[::-1], outward[::-1]
+                half = Rotation.from_rotvec(np.pi * outward)
+                quaternions = steady((half * Rotation.from_quat(quaternions[::-1])).as_quat())
+            segments += _segments(positions, quaternions, outward, number, strategy)
+            number += 1
     return tuple(segments)
+
+
+def _held(
+    contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Positions and quaternions of a tool along lines on the surface."""
+    held = []
+    for line, outward in zip(contacts, normals, strict=True):
+        travel = travel_of(line, 0.5 * strategy.stepover_m)
+        turns = tool_quaternions(travel, outward, strategy.lead_rad, strategy.tilt_rad)
+        axis = Rotation.from_quat(turns).as_matrix()[:, :, 2]
+        held.append((line - strategy.standoff_m * axis, turns))
+    return held
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
@@ -211,29 +246,35 @@ def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
     return ordered
 
 
-def _segments(line: Line, number: int, strategy: Strategy) -> list[Segment]:
+def _segments(
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    normals: np.ndarray,
+    number: int,
+    strategy: Strategy,
+) -> list[Segment]:
     """Approach, process and departure of one line."""
-    travel = travel_of(line.contacts, 0.5 * strategy.stepover_m)
-    quaternions = tool_quaternions(travel, line.normals, strategy.lead_rad, strategy.tilt_rad)
-    axis = Rotation.from_quat(quaternions).as_matrix()[:, :, 2]
-    places = line.contacts - strategy.standoff_m * axis
-    segments = []
-    if strategy.approach_distance_m > 0.0:
-        angle, distance = strategy.approach_angle_rad, strategy.approach_distance_m
-        away = np.cos(angle) * line.normals[0] - np.sin(angle) * travel[0]
-        way = np.stack([places[0] + distance * away, places[0]])
-        held = np.stack([quaternions[0]] * 2)
-        segments.append(Segment("approach", number, way, held, strategy.approach_feed_m_s))
-    segments.append(
-        Segment(
-            "process", number, places, quaternions,
-            strategy.feed_m_s, strategy.force_n, strategy.dwell_s,
-        )
+    work = Segment(
+        "process", number, positions, quaternions,
+        strategy.feed_m_s, strategy.force_n, strategy.dwell_s,
     )  # fmt: skip
+    segments = [work]
+    ends = surface_frames(
+        Rotation.from_quat(quaternions[[0, -1]]).as_matrix()[:, :, 0], normals[[0, -1]]
+    )
+    if strategy.approach_distance_m > 0.0:
+        away = _leaving(ends[0], -strategy.approach_angle_rad)
+        start = positions[0] + strategy.approach_distance_m * away
+        way, held = np.stack([start, positions[0]]), quaternions[[0, 0]]
+        segments.insert(0, Segment("approach", number, way, held, strategy.approach_feed_m_s))
     if strategy.retract_distance_m > 0.0:
-        angle, distance = strategy.retract_angle_rad, strategy.retract_distance_m
-        away = np.cos(angle) * line.normals[-1] + np.sin(angle) * travel[-1]
-        way = np.stack([places[-1], places[-1] + distance * away])
-        held = np.stack([quaternions[-1]] * 2)
+        away = _leaving(ends[1], strategy.retract_angle_rad)
+        stop = positions[-1] + strategy.retract_distance_m * away
+        way, held = np.stack([positions[-1], stop]), quaternions[[-1, -1]]
         segments.append(Segment("departure", number, way, held, strategy.retract_feed_m_s))
     return segments
+
+
+def _leaving(frame: np.ndarray, angle: float) -> np.ndarray:
+    """The direction at `angle` (rad) from the normal towards x of an upright frame (3, 3)."""
+    return np.sin(angle) * frame[:, 0] - np.cos(angle) * frame[:, 2]

@@ -15,8 +15,8 @@ Stroke = np.ndarray
 def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
     """Lines across a patch, `stepover_m` apart along the surface, at `angle` (rad) in its plane.
 
-    One list for each connected part of the patch inside its margin, in snake order; lines are broken
-    where the surface is. A part's lines are centred on it.
+    One list for each connected part of the patch inside its margin, in snake order; lines are
+    broken where the surface is. A part's lines are centred on it.
     """
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     uv = patch.uv @ turn.T

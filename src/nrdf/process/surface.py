@@ -132,7 +132,8 @@ class Surface:
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
         near, weight = self._same_side(points, unit(normals), count, radius)
         mean = np.einsum("mk,mka->ma", weight, self.normals[near])
-        return np.where(weight.any(axis=1)[:, None], unit(mean), unit(normals))
+        found = np.asarray(weight.any(axis=1))[:, None]
+        return np.where(found, unit(mean), unit(normals))
 
     def _same_side(
         self, points: np.ndarray, normals: np.ndarray, count: int, radius: float
