@@ -42,12 +42,15 @@ def wild_job(seed: int = 0) -> Job:
 
 
 def small_job() -> Job:
-    """One line of sanding on a bent plate, and a look at it: for the golden files."""
-    x = np.array([0.1, 0.12, 0.1415, 0.16])
-    lean = [0.0, 4.0, 7.5, 11.0]
-    positions = np.stack([x, np.full(4, -0.02531), 0.4 - (x - 0.1) ** 2], axis=1)
-    turned = Rotation.from_euler("YX", [[a, 180.0] for a in lean], degrees=True).as_quat()
-    up = positions + [0.0, 0.0, 0.05]
+    """One line of sanding on a bent plate, and a look at it: for the golden files.
+
+    Rounded, so that the last bit of a sine on another machine is no drift; nothing at a tie.
+    """
+    x = np.array([0.1003, 0.1202, 0.1415, 0.1601])
+    turns = [[20.0, 3.0 + a, 175.0 - a] for a in (0.0, 4.1, 7.3, 11.2)]
+    turned = np.round(Rotation.from_euler("ZYX", turns, degrees=True).as_quat(), 8)
+    positions = np.round(np.stack([x, 0.0253 + 0.36 * x, 0.4 - (x - 0.1) ** 2], axis=1), 6)
+    up = positions + np.array([0.0, 0.0, 0.05])
     sanding = (
         Segment("approach", 0, np.stack([up[0], positions[0]]), turned[[0, 0]], 0.1),
         Segment("process", 0, positions, turned, 0.0333, 15.0, 0.5),

@@ -8,11 +8,11 @@ import numpy as np
 
 from nrdf.export.header import (
     commented,
-    path_title,
-    segment_title,
     header,
+    path_title,
     revolutions_per_minute,
     save,
+    segment_title,
 )
 from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from nrdf.errors import ProcessError
 from nrdf.export.header import (
     commented,
-    path_title,
-    segment_title,
     header,
+    path_title,
     revolutions_per_minute,
     save,
+    segment_title,
 )
 from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options

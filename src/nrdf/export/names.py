@@ -17,9 +17,9 @@ _DEVICES = frozenset(
 
 
 def plain_text(text: str) -> str:
-    """`text` in ASCII letters, digits, spaces and . + - _ alone, for comments."""
-    ascii_text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
-    return re.sub(r"[^A-Za-z0-9 .+_-]", "_", ascii_text).strip() or "unnamed"
+    """`text` for comments: accents dropped; all but A-Z a-z 0-9 . + - _ and spaces turned to _."""
+    letters = (c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    return re.sub(r"[^A-Za-z0-9 .+_-]", "_", "".join(letters)).strip() or "unnamed"
 
 
 def identifier(text: str, longest: int) -> str:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from nrdf.export.header import (
     commented,
-    path_title,
-    segment_title,
     header,
+    path_title,
     save,
+    segment_title,
     tool_z_words,
 )
 from nrdf.export.names import identifier, number, numbers, program_name
