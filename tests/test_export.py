@@ -158,17 +158,19 @@ def test_json_keeps_parameters_as_they_are(tmp_path):
 
 
 @pytest.mark.parametrize("tool_z", [None, "into"])
-def test_noether_has_a_tool_path_a_line_and_a_segment_a_contact(wild, tmp_path, tool_z):
+def test_noether_has_a_tool_path_for_each_line_and_a_segment_for_each_contact(
+    wild, tmp_path, tool_z
+):
     path = written(wild, "noether", tmp_path, Options(tool_z=tool_z))
-    tool_paths = yaml.safe_load("\n".join(read_lines(path)))
+    of_paths = yaml.safe_load("\n".join(read_lines(path)))
     # Line 1 has two process segments, so two contacts.
-    assert [len(segments) for segments in tool_paths] == [1, 2, 1]
-    assert [len(segment) for segments in tool_paths for segment in segments] == [30, 27, 8, 9]
+    assert [[len(line) for line in lines] for lines in of_paths] == [[1, 2], [1]]
+    segments = [segment for lines in of_paths for line in lines for segment in line]
+    assert [len(segment) for segment in segments] == [30, 27, 8, 9]
     kinds = iter([s.kind for p in wild.paths for s in p.segments for _ in s.positions])
     feeds = iter([s.feed_m_s for p in wild.paths for s in p.segments for _ in s.positions])
-    poses = [pose for segments in tool_paths for segment in segments for pose in segment]
     reads = []
-    for pose in poses:
+    for pose in (pose for segment in segments for pose in segment):
         assert set(pose) == {"x", "y", "z", "qx", "qy", "qz", "qw"}
         x, y, z, qx, qy, qz, qw = (pose[key] for key in ["x", "y", "z", "qx", "qy", "qz", "qw"])
         turn = Rotation.from_quat([qx, qy, qz, qw]).as_matrix()

@@ -15,7 +15,7 @@ def export(
     job: Positional[Path],
     format: tuple[str, ...],
     out: Path | None = None,
-    options: OmitArgPrefixes[Options] = Options(),  # noqa: B008
+    programs: OmitArgPrefixes[Options] = Options(),  # noqa: B008
     overwrite: bool = False,
 ) -> None:
     """Write a job's tool paths for a robot, a machine tool or CAM.
@@ -29,7 +29,7 @@ def export(
         job: Folder that `nrdf transfer` wrote, with toolpaths.json in it.
         format: One or more formats.
         out: Folder to write; the folder export in the job's unless given.
-        options: Choices about the programs.
+        programs: Choices about what is written.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.commands.retrieve import write_report
@@ -41,8 +41,8 @@ def export(
     content = read_job(job)
     place = out or (job if job.is_dir() else job.parent) / "export"
     with output_folder(place, overwrite) as folder:
-        files = export_job(content, format, folder, options)
-        report = {"command": command_line(), "job": str(job), "options": asdict(options)}
+        files = export_job(content, format, folder, programs)
+        report = {"command": command_line(), "job": str(job), "options": asdict(programs)}
         write_report(folder, {**report, "formats": files})
     shown = table("", "format", "")
     for name, written in files.items():

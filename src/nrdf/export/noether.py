@@ -1,8 +1,9 @@
-"""ROS-Industrial Noether's ToolPaths as YAML: tool paths of segments of waypoints.
+"""ROS-Industrial Noether's tool paths as YAML, as its GUI saves them.
 
-Its YAML conversion (noether_tpp/serialization.h) reads and writes a waypoint as a mapping of x, y,
-z, qw, qx, qy, qz. A segment is what is driven without leaving the surface, with its approach and
-departure as Noether's own modifiers add them; a tool path is the segments of one line.
+A file is a list of ToolPaths, here one a path of the job; ToolPaths are a list of ToolPath, here
+one a line; a ToolPath is a list of segments, here what is driven without leaving the surface, with
+its approach and departure as Noether's own modifiers add them; a segment is a list of waypoints, x,
+y, z, qw, qx, qy, qz (noether_tpp/serialization.h).
 """
 
 from __future__ import annotations
@@ -34,14 +35,14 @@ def write(job: Job, options: Options, folder: Path) -> None:
     turned = f"unit quaternion; {tool_z_words(options, 'out')}."
     lines = commented(header(job, options, "Lengths in m.", turned, _CARRIED), "# ")
     for i, path in enumerate(job.paths, start=1):
-        lines += commented([path_title(path, i)], "# ")
+        lines += ["-", *commented([path_title(path, i)], "  # ")]
         numbered = enumerate(path.segments, start=1)
         for line, of_line in groupby(numbered, key=lambda item: item[1].line):
-            lines.append(f"- # line {line}")
+            lines.append(f"  - # line {line}")
             for contact in _contacts(list(of_line)):
-                lines.append("  -")
-                for number, segment in contact:
-                    lines += commented([segment_title(segment, number)], "    # ")
+                lines.append("    -")
+                for index, segment in contact:
+                    lines += commented([segment_title(segment, index)], "      # ")
                     lines += _waypoints(segment)
     save(folder / f"{name}.yaml", lines)
 
@@ -64,5 +65,5 @@ def _waypoints(segment: Segment) -> list[str]:
     for position, quaternion in zip(segment.positions, segment.quaternions_xyzw, strict=True):
         values = numbers(position, 9) + numbers(quaternion, 12)
         pairs = (f"{key}: {value}" for key, value in zip(_KEYS, values, strict=True))
-        made.append("    - {" + ", ".join(pairs) + "}")
+        made.append("      - {" + ", ".join(pairs) + "}")
     return made

@@ -18,25 +18,24 @@ class Options:
     """
 
     program: str | None = None
-    """Name of the program, made to fit each controller's rules; nrdf_CATEGORY unless given."""
+    """The program's name, made to fit each controller's rules; nrdf_CATEGORY unless given."""
     frame: str | None = None
-    """Name of the frame, work object or base that positions are in; the job's unless given."""
+    """Name of the positions' frame (work object, base); the job's unless given."""
     tool: str | None = None
     """Name of the tool in the controller, for all paths; each path's own unless given."""
     tool_z: ToolZ | None = None
-    """Where the tool's z axis points: into the part, or out of it (tool x, along the travel,
-    stays). Unless given: out for noether, into for the others."""
+    """Where tool z points, into or out of the part; out for noether, into for others if not given.
+    """
     tool_number: int = 1
-    """Number of the first tool (apt, gcode, krl); further tools count up from it."""
+    """The first tool's number (apt, gcode, krl); further tools count up from it."""
     frame_number: int = 1
-    """Number of the base (krl: BASE_DATA[n]) or work offset (gcode: 1 to 6 are G54 to G59)."""
+    """Number of the base (krl: BASE_DATA) or of the work offset (gcode: 1 to 6 are G54 to G59)."""
     program_number: int = 1
     """Number of the program (gcode: O0001)."""
     process_only: bool = False
     """Leave approach and departure out."""
     blend_mm: float = 1.0
-    """How far before a waypoint a robot may begin to round it (urscript, rapid, krl); at most
-    0.45 of the way to its neighbours is used. 0: stop at every waypoint."""
+    """How far from a waypoint a robot may round it (urscript, rapid, krl); 0: it stops at each."""
     acceleration_m_s2: float = 0.5
     """Acceleration of the tool centre point (urscript)."""
     rotary: Literal["AC", "BC"] = "AC"
@@ -44,8 +43,8 @@ class Options:
     tilt: Literal["positive", "negative"] = "positive"
     """Sign of the A or B axis (gcode); either reaches every direction."""
     without_tcp_control: bool = False
-    """X Y Z of a machine's own axes instead of G43.4 (gcode): the work offset must be where the
-    axes of the two rotary tables meet, and feeds and lines between waypoints are approximate."""
+    """The machine's own X Y Z instead of G43.4 (gcode); its two rotary tables meet in the origin.
+    """
 
     def __post_init__(self) -> None:
         _within("tool-number", self.tool_number, 1, 16)
