@@ -12,7 +12,7 @@ from nrdf.export.header import (
     segment_title,
     tool_z_words,
 )
-from nrdf.export.names import identifier, number, numbers, program_name
+from nrdf.export.names import number, numbers, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes, tool_numbers
 from nrdf.export.rotation import kuka_abc_deg
@@ -44,9 +44,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     turned = f"A B C in degrees about Z, new Y, new X; {tool_z_words(options, 'into')}."
     said = header(job, options, "Lengths in mm.", turned, _CARRIED, _NOTES)
     constants = {tool: f"nrdf_tool_{n}" for tool, n in tool_numbers(job, options).items()}
-    procedures = [
-        identifier(f"p{i} {path.region}", _LONGEST) for i, path in enumerate(job.paths, start=1)
-    ]
+    procedures = routine_names(job, _LONGEST)
     lines = ["&ACCESS RVP", "&REL 1", f"DEF {name}( )", *commented(said, "; ")]
     lines += [";FOLD INI", "BAS(#INITMOV,0)", ";ENDFOLD (INI)"]
     lines += ["BAS(#VEL_PTP,10)", "BAS(#BASE,nrdf_base)", "$APO.CDIS=nrdf_blend_mm"]

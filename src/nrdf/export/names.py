@@ -51,6 +51,11 @@ def identifiers(names: Iterable[str], longest: int, language: str) -> dict[str, 
     return made
 
 
+def routine_names(job: Job, longest: int) -> list[str]:
+    """An identifier for each path of `job`: p, its number, its region."""
+    return [identifier(f"p{i} {path.region}", longest) for i, path in enumerate(job.paths, start=1)]
+
+
 def program_name(job: Job, options: Options, longest: int, language: str, words: str = "") -> str:
     """The program's name as an identifier of a language whose own words (lower case) are `words`.
 

@@ -12,7 +12,7 @@ from nrdf.export.header import (
     segment_title,
     tool_z_words,
 )
-from nrdf.export.names import identifier, identifiers, number, numbers, program_name
+from nrdf.export.names import identifier, identifiers, number, numbers, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
 from nrdf.export.rotation import quaternions_wxyz
@@ -50,9 +50,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     )
     speeds = {s.feed_m_s: "" for path in job.paths for s in path.segments}
     speeds = {feed: f"nrdf_v{i}" for i, feed in enumerate(speeds, start=1)}
-    procedures = [
-        identifier(f"p{i} {path.region}", _LONGEST) for i, path in enumerate(job.paths, start=1)
-    ]
+    procedures = routine_names(job, _LONGEST)
     # A module and a routine in it must not have one name.
     lines = [f"MODULE mod_{name}", *commented(said, "  ! ")]
     for feed, speed in speeds.items():

@@ -12,7 +12,7 @@ from nrdf.export.header import (
     segment_title,
     tool_z_words,
 )
-from nrdf.export.names import identifier, number, numbers, program_name
+from nrdf.export.names import number, numbers, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
 from nrdf.export.rotation import rotation_vectors
@@ -40,9 +40,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     name = program_name(job, options, 32, "URScript", _WORDS)
     turned = f"rotation vector rx ry rz in rad; {tool_z_words(options, 'into')}."
     said = header(job, options, "Lengths in m, speeds in m/s.", turned, _CARRIED, _NOTES)
-    procedures = [
-        identifier(f"p{i} {path.region}", 32) for i, path in enumerate(job.paths, start=1)
-    ]
+    procedures = routine_names(job, 32)
     lines = [*commented(said, "# "), f"def {name}():", *_shared()]
     for i, (procedure, path) in enumerate(zip(procedures, job.paths, strict=True), start=1):
         lines += [f"  def {procedure}():", *commented([path_title(path, i)], "    # ")]
