@@ -30,7 +30,7 @@ from read_programs import (
 )
 
 GOLDEN = Path(__file__).parent / "golden"
-POSITION_M, TURN_RAD = 1e-6, 1e-6
+POSITION_M, TURN_RAD = 1e-7, 2e-7
 HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
