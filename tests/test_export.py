@@ -47,14 +47,14 @@ def angle_between(a, b):
     return Rotation.from_matrix(np.asarray(a).T @ b).magnitude()
 
 
-def compare(job: Job, paths: list[list[Read]], force=False, dwell=True, turn=None):
+def compare(job, paths: list[list[Read]], force=False, dwell=True, turn=None, within=POSITION_M):
     """What was read against `job`: poses, kinds, feeds on lines, and force where it is carried."""
     assert len(paths) == len(job.paths)
     for path, reads in zip(job.paths, paths, strict=True):
         rows = [(segment, n) for segment in path.segments for n in range(len(segment.positions))]
         assert len(rows) == len(reads)
         for i, ((segment, n), read) in enumerate(zip(rows, reads, strict=True)):
-            assert np.linalg.norm(read.position - segment.positions[n]) <= POSITION_M
+            assert np.linalg.norm(read.position - segment.positions[n]) <= within
             expected = Rotation.from_quat(segment.quaternions_xyzw[n]).as_matrix()
             expected = expected if turn is None else expected @ turn
             expected = -expected[:, 2] if read.orientation.ndim == 1 else expected
@@ -90,7 +90,9 @@ def test_apt(wild, tmp_path):
 def test_gcode(wild, tmp_path, rotary, tilt, without):
     options = Options(rotary=rotary, tilt=tilt, without_tcp_control=without, frame_number=3)
     path = written(wild, "gcode", tmp_path, options)
-    compare(wild, read_gcode(path, rotary, not without))
+    # On the tables, the rounding of an angle moves a point that is metres away.
+    within = 1e-6 if without else POSITION_M
+    compare(wild, read_gcode(path, rotary, not without), within=within)
     assert "G56" in read_lines(path)
 
 
