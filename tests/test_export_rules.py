@@ -56,6 +56,7 @@ def test_segments_are_joined_smoothly_unless_something_happens_between_them():
     assert blends_mm(free, more) == [[0, 5], [5, 0]]
     assert blends_mm(replace(free, dwell_s=1.0), more) == [[0, 0], [5, 0]]
     assert blends_mm(free, replace(more, force_n=5.0)) == [[0, 0], [5, 0]]
+    assert blends_mm(free, straight("process", 100, dwell=1.0), more) == [[0, 0], [], [5, 0]]
     both = replace(free, force_n=5.0), replace(more, force_n=5.0)
     assert blends_mm(*both) == [[0, 5], [5, 0]]
 
@@ -139,6 +140,13 @@ def test_each_tool_has_a_number(tmp_path):
         "LOADTL/3",
     ]
     assert (tmp_path / "gcode/nrdf_chair.nc").read_text().count(" M6\n") == 3
+    export_job(job, ["urscript"], tmp_path)
+    path = tmp_path / "urscript/nrdf_chair.script"
+    assert [w for line in read_lines(path) for w in line.split() if "popup" in w] == [
+        'popup("b:',
+        'popup("a:',
+    ]
+    assert len(read_urscript(path)) == 3
 
 
 EVIL = [

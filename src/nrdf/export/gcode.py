@@ -43,6 +43,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
     loaded = None
     for i, path in enumerate(job.paths, start=1):
         lines += _comments([path_title(path, i)])
+        # Up before anything turns or is changed: the way to the part is nobody's plan.
+        lines.append("G53 G0 Z0.0")
         tool = numbers_of[path.tool]
         if tool != loaded:
             lines.append(f"T{tool} M6")
@@ -83,10 +85,8 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     lines = []
     if path.spindle_rad_s is not None:
         lines.append(f"S{revolutions_per_minute(path.spindle_rad_s):.0f} M3")
-    # Up, turned, and only then to the part: the way there is nobody's plan.
-    point, angles = words[0]
     offset = "G43" if options.without_tcp_control else "G43.4"
-    lines += ["G53 G0 Z0.0", f"G0 {angles}", f"{offset} H{tool}"]
+    lines += [f"G0 {words[0][1]}", f"{offset} H{tool}"]
     row = 0
     for index, stroke in enumerate(driven, start=1):
         segment = stroke.segment

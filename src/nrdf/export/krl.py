@@ -43,7 +43,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
     name = program_name(job, options, _LONGEST, "KRL", _WORDS)
     turned = f"A B C in degrees about Z, new Y, new X; {tool_z_words(options, 'into')}."
     said = header(job, options, "Lengths in mm.", turned, _CARRIED, _NOTES)
-    constants = {tool: f"nrdf_tool_{n}" for tool, n in tool_numbers(job, options).items()}
+    numbers_of = tool_numbers(job, options)
+    constants = {tool: f"nrdf_tool_{n}" for tool, n in numbers_of.items()}
     procedures = routine_names(job, _LONGEST)
     lines = ["&ACCESS RVP", "&REL 1", f"DEF {name}( )", *commented(said, "; ")]
     lines += [";FOLD INI", "BAS(#INITMOV,0)", ";ENDFOLD (INI)"]
@@ -55,7 +56,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     save(folder / f"{name}.src", lines, "\r\n")
     data = ["&ACCESS RVP", "&REL 1", f"DEFDAT {name}", "EXT BAS(BAS_COMMAND :IN,REAL :IN )"]
     data += [f"DECL INT nrdf_base={options.frame_number}"]
-    data += [f"DECL INT {constants[t]}={n}" for t, n in tool_numbers(job, options).items()]
+    data += [f"DECL INT {constants[t]}={n}" for t, n in numbers_of.items()]
     data += [f"DECL REAL nrdf_blend_mm={number(options.blend_mm, 3)}", "ENDDAT"]
     save(folder / f"{name}.dat", data, "\r\n")
 

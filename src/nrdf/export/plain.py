@@ -14,6 +14,10 @@ from nrdf.export.prepare import prepare
 from nrdf.process.toolpath import Job
 
 VERSION = 1
+_CARRIED = (
+    "force_n null: no contact. spindle_rad_s null: nothing turns. dwell_s: after the segment's "
+    "last waypoint."
+)
 WAYPOINT = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 
 
@@ -34,7 +38,7 @@ def _on_one_line(found: re.Match[str]) -> str:
 def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, Any]:
     """All of a prepared `job` as JSON has it, the waypoints themselves if wanted."""
     turned = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
-    conventions = header(job, options, "SI units.", turned, "Nothing is left out.")
+    conventions = header(job, options, "SI units.", turned, _CARRIED)
     paths = []
     for path in job.paths:
         segments = []

@@ -90,14 +90,14 @@ def strokes(path: ToolPath, blend_m: float) -> list[Stroke]:
     way = np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1)
     blends = np.minimum(blend_m, 0.45 * np.minimum(way, np.append(way[1:], 0.0)))
     blends[blends < _SMALLEST_BLEND_M] = 0.0
-    made = []
     for i, segment in enumerate(path.segments):
-        mine = owner == i
         after = path.segments[i + 1] if i + 1 < len(path.segments) else None
-        if mine.any() and (segment.dwell_s or not after or after.force_n != segment.force_n):
-            blends[np.flatnonzero(mine)[-1]] = 0.0
-        made.append((segment, mine))
-    return [Stroke(s, positions[mine], quaternions[mine], blends[mine]) for s, mine in made]
+        if segment.dwell_s or not after or after.force_n != segment.force_n:
+            blends[np.flatnonzero(owner <= i)[-1]] = 0.0
+    return [
+        Stroke(segment, positions[owner == i], quaternions[owner == i], blends[owner == i])
+        for i, segment in enumerate(path.segments)
+    ]
 
 
 def tool_numbers(job: Job, options: Options) -> dict[str, int]:

@@ -48,8 +48,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
         f"Must exist in the controller: wobjdata {frame}; tooldata {', '.join(tools.values())}. "
         "The configuration is left to the controller (ConfL off).",
     )
-    speeds = {s.feed_m_s: "" for path in job.paths for s in path.segments}
-    speeds = {feed: f"nrdf_v{i}" for i, feed in enumerate(speeds, start=1)}
+    feeds = dict.fromkeys(s.feed_m_s for path in job.paths for s in path.segments)
+    speeds = {feed: f"nrdf_v{i}" for i, feed in enumerate(feeds, start=1)}
     procedures = routine_names(job, _LONGEST)
     # A module and a routine in it must not have one name.
     lines = [f"MODULE mod_{name}", *commented(said, "  ! ")]

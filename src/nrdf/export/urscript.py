@@ -12,7 +12,7 @@ from nrdf.export.header import (
     segment_title,
     tool_z_words,
 )
-from nrdf.export.names import number, numbers, program_name, routine_names
+from nrdf.export.names import number, numbers, plain_text, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
 from nrdf.export.rotation import rotation_vectors
@@ -28,8 +28,8 @@ _CARRIED = (
     "with force to the last. Spindle speed is not: switch it where a path begins. Dwell is."
 )
 _NOTES = (
-    "Set before use: nrdf_frame, the pose of the frame in the robot's base; the TCP, the payload "
-    "and its centre of gravity in the installation. zero_ftsensor needs an e-Series or newer."
+    "Set before use: nrdf_frame, the pose of the frame in the robot's base; TCP, payload and centre "
+    "of gravity of the first tool in the installation, of others where popup asks. zero_ftsensor needs an e-Series or newer."
 )
 _JOINT_SPEED = "a=0.5, v=0.3"
 
@@ -42,8 +42,12 @@ def write(job: Job, options: Options, folder: Path) -> None:
     said = header(job, options, "Lengths in m, speeds in m/s.", turned, _CARRIED, _NOTES)
     procedures = routine_names(job, 32)
     lines = [*commented(said, "# "), f"def {name}():", *_shared()]
+    mounted = job.paths[0].tool
     for i, (procedure, path) in enumerate(zip(procedures, job.paths, strict=True), start=1):
         lines += [f"  def {procedure}():", *commented([path_title(path, i)], "    # ")]
+        if path.tool != mounted:
+            lines += _change_tool(path.tool)
+            mounted = path.tool
         lines += [f"    {line}" for line in _path(path, options)] + ["  end"]
     save(folder / f"{name}.script", [*lines, *(f"  {p}()" for p in procedures), "end"])
 
@@ -60,6 +64,15 @@ def _shared() -> list[str]:
         "      sync()",
         "    end",
         "  end",
+    ]
+
+
+def _change_tool(tool: str) -> list[str]:
+    """A stop: a program cannot know the TCP of a second tool."""
+    name = plain_text(tool)
+    return [
+        f"    # Set the TCP and payload of {name} here: set_tcp(p[...]), set_payload(...)",
+        f'    popup("{name}: is it mounted, and its TCP set?", title="nrdf", blocking=True)',
     ]
 
 
