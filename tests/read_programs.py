@@ -181,7 +181,7 @@ def read_urscript(path: Path) -> list[list[Read]]:
             numbers = r"\[[^][]+\]"
             assert re.fullmatch(
                 rf"force_mode\(get_actual_tcp_pose\(\), {numbers}, {numbers}, 2, {numbers}\)|"
-                r'popup\("[\w .+-]+: is it mounted, and its TCP set\?", title="nrdf", blocking=True\)|'
+                r'popup\("[\w .+-]+: [\w ,]+\?", title="nrdf", blocking=True\)|'
                 rf"global nrdf_frame = p{numbers}|global nrdf_force_n = 0\.0",
                 line,
             ), line

@@ -142,7 +142,7 @@ def test_each_tool_has_a_number(tmp_path):
     assert (tmp_path / "gcode/nrdf_chair.nc").read_text().count(" M6\n") == 3
     export_job(job, ["urscript"], tmp_path)
     path = tmp_path / "urscript/nrdf_chair.script"
-    assert [w for line in read_lines(path) for w in line.split() if "popup" in w] == [
+    assert [w for line in read_lines(path) for w in line.split() if w.startswith("popup(")] == [
         'popup("b:',
         'popup("a:',
     ]

@@ -28,8 +28,9 @@ _CARRIED = (
     "with force to the last. Spindle speed is not: switch it where a path begins. Dwell is."
 )
 _NOTES = (
-    "Set before use: nrdf_frame, the pose of the frame in the robot's base; TCP, payload and centre "
-    "of gravity of the first tool in the installation, of others where popup asks. zero_ftsensor needs an e-Series or newer."
+    "Set before use: nrdf_frame, the pose of the frame in the robot's base; TCP, payload and "
+    "centre of gravity of the first tool in the installation, of others where the program stops "
+    "for them. zero_ftsensor needs an e-Series or newer."
 )
 _JOINT_SPEED = "a=0.5, v=0.3"
 
