@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import OutputError
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.render import Camera, Scene, Strokes, render
+from nrdf.render import FRONT, Camera, Scene, Strokes, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +34,6 @@ MOST_POINTS = 20_000
 _MARGIN = 0.05  # canonical, around each object
 
 
-FRONT = Camera(0.65, 0.38)
 OTHER_SIDES = (
     Camera(0.65 + np.pi, 0.38),
     Camera(0.65, -0.45),
@@ -70,10 +69,12 @@ def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> 
     """Write a picture of `panels` side by side, one colour a region; `path`'s ending is its format.
 
     The same camera is used for all of them, and a second row is added from another side if some
-    region could hardly be seen. `size`: width of a panel in pixels. Takes about 0.2 s a panel.
-    Raises OutputError if the file cannot be written.
+    region could hardly be seen (beside the first for one panel). `size`: width of a panel in
+    pixels. Takes about 0.2 s a panel. Raises OutputError if the file cannot be written.
     """
     rows, colours = render_panels(panels, size)
+    if len(panels) == 1:
+        rows = [_of_one_height([row[0] for row in rows])]
     _compose(rows, panels, colours, Path(path), size)
 
 
@@ -92,6 +93,31 @@ def render_panels(
     if hidden:
         rows.append(_row(drawn, colours, _best_side(drawn, hidden), size))
     return rows, colours
+
+
+def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:
+    """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side."""
+    every = list(dict.fromkeys((*panel.regions, *panel.lines)))
+    table = np.array([*region_colours(every).values(), BASE_COLOUR])
+    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+    scene = _prepare(panel, every)
+
+    def draw(name: str) -> np.ndarray:
+        own = scene.region == every.index(name)
+        if not own.any():
+            return np.ones((size, size, 3), np.float32)
+        axes = Camera.towards(scene.normals[own].mean(axis=0)).axes()
+        view = scene.points @ axes.T
+        low, high = view[own].min(axis=0)[:2], view[own].max(axis=0)[:2]
+        side = 1.2 * float((high - low).max()) + _MARGIN
+        corner = (low + high - side) / 2
+        near = ((view[:, :2] > corner - 0.05) & (view[:, :2] < corner + side + 0.05)).all(axis=1)
+        colours = pale if scene.lines else table
+        drawn = scene.select(near)
+        return render(drawn, axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return dict(zip(names, pool.map(draw, names), strict=True))
 
 
 def _prepare(panel: Panel, names: list[str]) -> Scene:
@@ -162,6 +188,12 @@ def _facing(drawn: list[Scene], region: int, camera: Camera) -> float:
     return float((normals @ toward > 0.1).mean()) if len(normals) else 1.0
 
 
+def _of_one_height(images: list[np.ndarray]) -> list[np.ndarray]:
+    """Pictures with white above the lower ones."""
+    tall = max(len(image) for image in images)
+    return [np.pad(i, ((tall - len(i), 0), (0, 0), (0, 0)), constant_values=1.0) for i in images]
+
+
 def _compose(
     rows: list[list[np.ndarray]],
     panels: Sequence[Panel],
@@ -176,13 +208,13 @@ def _compose(
     dpi = 100
     header = 62 if any(panel.note for panel in panels) else 40
     footer = 50 if colours else 10
-    width = size * len(panels)
+    width = size * len(rows[0])
     height = header + footer + sum(row[0].shape[0] for row in rows)
     figure = Figure((width / dpi, height / dpi), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     top = height - header
     for i, panel in enumerate(panels):
-        x = (i + 0.5) * size / width
+        x = (i + 0.5) / len(panels)
         text: dict[str, Any] = {"ha": "center", "va": "top", "family": "DejaVu Sans"}
         figure.text(x, 1 - 12 / height, panel.title, size=13, weight="bold", color="#222", **text)
         figure.text(x, 1 - 38 / height, panel.note, size=10.5, color="#666", **text)

@@ -32,6 +32,18 @@ class Camera:
         right = np.array([np.sin(a), 0.0, -np.cos(a)])
         return np.stack([right, np.cross(toward, right), toward])
 
+    @staticmethod
+    def towards(normal: np.ndarray) -> Camera:
+        """A view that sees a surface with this normal (3,) well, and somewhat from the front."""
+        length = float(np.linalg.norm(normal))
+        looked = 0.35 * FRONT.axes()[2] + (normal / length if length > 0.1 else 0.0)
+        flat = float(np.hypot(looked[0], looked[2]))
+        azimuth = float(np.arctan2(looked[2], looked[0])) if flat > 1e-6 else FRONT.azimuth
+        return Camera(azimuth, float(np.clip(np.arctan2(looked[1], flat), -1.2, 1.2)))
+
+
+FRONT = Camera(0.65, 0.38)
+
 
 @dataclass(frozen=True)
 class Strokes:
@@ -51,6 +63,11 @@ class Scene:
     region: np.ndarray
     radius: np.ndarray
     lines: tuple[Strokes, ...] = ()
+
+    def select(self, mask: np.ndarray) -> Scene:
+        """Only the points of a mask (n,), with all lines."""
+        kept = (self.points[mask], self.normals[mask], self.region[mask], self.radius[mask])
+        return Scene(*kept, self.lines)
 
 
 def render(
@@ -152,10 +169,12 @@ def _paint(
         column, row = np.floor((view[:, :2] - corner) * pixels).astype(int).T
         reach = np.arange(-int(radius), int(radius) + 1)
         dx, dy = (grid.ravel() for grid in np.meshgrid(reach, reach))
-        round_ = dx**2 + dy**2 <= radius**2
-        x = np.clip(column[:, None] + dx[round_], 0, image.shape[1] - 1)
-        y = np.clip(row[:, None] + dy[round_], 0, image.shape[0] - 1)
-        seen = view[:, 2:] > cover[y, x]
+        dx, dy = dx[dx**2 + dy**2 <= radius**2], dy[dx**2 + dy**2 <= radius**2]
+        x, y = column[:, None] + dx, row[:, None] + dy
+        inside = (x >= 0) & (x < image.shape[1]) & (y >= 0) & (y < image.shape[0])
+        which, at = np.nonzero(inside)
+        x, y = x[which, at], y[which, at]
+        seen = view[which, 2] > cover[y, x]
         image[y[seen], x[seen]] = ink
 
 

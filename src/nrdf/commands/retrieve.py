@@ -61,7 +61,7 @@ def retrieve(
         clock = Clock()
         import nrdf
         from nrdf.picture import draw_regions
-        from nrdf.regions.files import read_regions
+        from nrdf.regions.files import read_regions, write_matches
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
@@ -129,26 +129,6 @@ def region_panel(
     from nrdf.picture import Panel
 
     return Panel(title, cloud.points, cloud.normals, dict(regions), note)
-
-
-def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
-    """Write <region>.ply for each match into a folder."""
-    import numpy as np
-
-    from nrdf.cloud import write_cloud
-    from nrdf.picture import region_colours
-
-    colours = region_colours(list(matches))
-    for name, match in matches.items():
-        # Paler where less certain.
-        strength = 0.25 + 0.75 * match.confidence[:, None]
-        mixed = strength * colours[name] + (1 - strength)
-        write_cloud(
-            folder / f"{name}.ply",
-            target.select(match.indices),
-            colours=(255 * mixed).astype(np.uint8),
-            scalars={"confidence": match.confidence, "index": match.indices},
-        )
 
 
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:

@@ -70,8 +70,9 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
 
     import nrdf
     from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-    from nrdf.commands.retrieve import region_panel, write_matches, write_report
+    from nrdf.commands.retrieve import region_panel, write_report
     from nrdf.picture import draw_regions
+    from nrdf.regions.files import write_matches
 
     loaded = nrdf.load_model(model, device)
     reference, regions = bundled_chair(REFERENCE)

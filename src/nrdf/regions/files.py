@@ -1,16 +1,18 @@
-"""Region files: clouds of points on the reference, or NumPy arrays of masks, indices or points."""
+"""Region files: read as clouds of points on the reference or NumPy arrays, written as clouds."""
 
 from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from nrdf.cloud import read_cloud
+from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
+from nrdf.picture import region_colours
+from nrdf.regions.model import Match
 from nrdf.units import METRES
 
 
@@ -53,3 +55,19 @@ def read_region_file(path: Path, unit: str | None = None) -> dict[str, np.ndarra
     if unit is not None and cloud.unit is not None:
         return {path.stem: cloud.points * (METRES[cloud.unit] / METRES[unit])}
     return {path.stem: cloud.points}
+
+
+def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
+    """Write <region>.ply for each match into a folder: the target's points in the region, with
+    their confidence and their index in the target."""
+    colours = region_colours(list(matches))
+    for name, match in matches.items():
+        # Paler where less certain.
+        strength = 0.25 + 0.75 * match.confidence[:, None]
+        mixed = strength * colours[name] + (1 - strength)
+        write_cloud(
+            folder / f"{name}.ply",
+            target.select(match.indices),
+            colours=(255 * mixed).astype(np.uint8),
+            scalars={"confidence": match.confidence, "index": match.indices},
+        )

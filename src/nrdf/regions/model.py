@@ -219,14 +219,21 @@ class Taught:
         reference = self.reference
         if reference.is_whole:
             return self._invert(target, self._k[:, indices], reference.normals[indices])
-        points = (reference.cloud.points[indices] - reference.centre) / reference.scale
         given = reference.cloud.normals
         normals = (
             given[indices]
             if given is not None
             else reference.normals[reference.nearest_working[indices]]
         )
-        return self._invert(target, self._describe(points, normals), normals)
+        return self.map_places(reference.cloud.points[indices], normals, target)
+
+    def map_places(self, points: np.ndarray, normals: np.ndarray, target: Embedded) -> Mapped:
+        """Where any places of the reference's surface arrive on a target.
+
+        points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
+        """
+        canonical = (points - self.reference.centre) / self.reference.scale
+        return self._invert(target, self._describe(canonical, normals), normals)
 
     def _by_mask(self, chosen: dict[str, np.ndarray], target: Embedded) -> dict[str, Match]:
         start = time.perf_counter()

@@ -1,0 +1,168 @@
+"""Taught waypoints carried through the correspondence, and directions.
+
+Each waypoint's foot on the reference's surface is mapped by C, brought onto the target's smooth
+surface, and the tool keeps its place and angles relative to the local frame of travel and normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from nrdf.process.frames import surface_frames, travel_of
+from nrdf.process.surface import Surface, unit
+from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.regions.model import Embedded, Taught
+
+FARTHEST, BEYOND = 0.08, 0.02
+"""Shares of the target's longest side that C's place may be off the target's surface, in all and
+sideways, beyond its edge or in a hole. A waypoint farther away has no counterpart."""
+_KEPT = 0.01  # of that sideways share, what is kept
+_SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
+
+
+@dataclass(frozen=True)
+class TaughtLine:
+    """A line of waypoints: positions (n, 3), m, and quaternions_xyzw (n, 4), tool to object."""
+
+    positions: np.ndarray
+    quaternions_xyzw: np.ndarray
+
+
+@dataclass(frozen=True)
+class CarriedLine(TaughtLine):
+    """A line on the target. normals: (n, 3) of the surface under it; taught: number of the taught
+    line; waypoints: (n,) which of its waypoints these are."""
+
+    normals: np.ndarray
+    taught: int
+    waypoints: np.ndarray
+
+
+class Correspondence:
+    """The way from a reference's surface to a target's.
+
+    taught, embedded: reference and target as the field sees them, both in metres. reference,
+    target: their surfaces, of the points that the field works on.
+    """
+
+    def __init__(
+        self, taught: Taught, embedded: Embedded, reference: Surface, target: Surface
+    ) -> None:
+        self.taught, self.embedded = taught, embedded
+        self.reference, self.target = reference, target
+        features = oriented_features(embedded.points, embedded.normals, NORMAL_WEIGHT)
+        self._tree = cKDTree(features)
+
+    def places(
+        self, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where places (m, 3) of the reference's surface, with normals (m, 3), are on the target.
+
+        Returns places on its smooth surface (m, 3), normals there (m, 3), and whether the place
+        exists (m,): C's own place lies near the surface.
+        """
+        embedded = self.embedded
+        mapped = self.taught.map_places(points, normals, embedded)
+        facing = unit(mapped.normals)
+        features = oriented_features(mapped.points, facing, NORMAL_WEIGHT)
+        nearest = self._tree.query(features)[1]
+        start, outward = embedded.points[nearest], embedded.normals[nearest]
+        offset = mapped.points - start
+        sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
+        length = np.linalg.norm(sideways, axis=1, keepdims=True)
+        near = start + sideways * np.minimum(1.0, _KEPT / np.maximum(length, 1e-12))
+        found, found_normals = self.target.project(embedded.original(near), outward)
+        exists = (np.linalg.norm(offset, axis=1) <= FARTHEST) & (length[:, 0] <= BEYOND)
+        return found, found_normals, exists
+
+    def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """A direction (3,) at a region of the reference, unit length, as it is on the target.
+
+        region: (k,) indices into the reference's cloud. The smooth map between the two regions is
+        taken as affine; across the surface, where points do not tell, as a turn and a scale.
+        """
+        here = self.taught.reference.cloud.points[region]
+        there = self.embedded.original(self.taught.map_points(region, self.embedded).points)
+        here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
+        turn, _ = Rotation.align_vectors(there, here) if len(here) > 2 else (Rotation.identity(), 0)
+        scale = np.sqrt((there**2).sum() / max((here**2).sum(), 1e-18))
+        similar = scale * turn.as_matrix()
+        spread = here.T @ here
+        ridge = 0.05 * np.trace(spread) / 3.0 * np.eye(3)
+        affine = np.linalg.solve(spread + ridge, here.T @ there + ridge @ similar.T).T
+        return unit(affine @ unit(np.asarray(direction, float)))
+
+    def carry(
+        self, lines: Sequence[TaughtLine], tool_radius_m: float
+    ) -> tuple[tuple[CarriedLine, ...], int]:
+        """Lines on the reference as lines on the target, and how many waypoints have no place.
+
+        A line is cut where waypoints have no counterpart. The tool's height over the surface, and
+        its angles to travel and normal, stay; a flat tool of `tool_radius_m` feels the normals.
+        """
+        if not lines:
+            return (), 0
+        positions = np.concatenate([line.positions for line in lines])
+        quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
+        owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
+        turns = Rotation.from_quat(quaternions).as_matrix()
+        feet, normals = self._feet(positions, -turns[:, :, 2])
+        felt = self.reference.smooth_normals(feet, normals, tool_radius_m)
+        found, found_normals, exists = self.places(feet, normals)
+        found_felt = self.target.smooth_normals(found, found_normals, tool_radius_m)
+        # Where there is no line to tell the travel, a short way along tool x is mapped.
+        ahead, ahead_normals = self.reference.project(
+            feet + 2 * self.reference.spacing * turns[:, :, 0], normals
+        )
+        step = self.places(ahead, ahead_normals)[0] - found
+        carried, lost = [], int((~exists).sum())
+        for number in range(len(lines)):
+            mine = np.flatnonzero(owner == number)
+            for run in _runs(exists[mine]):
+                at = mine[run]
+                frames = _frames(feet[at], felt[at], turns[at, :, 0], self.reference.spacing)
+                there = _frames(found[at], found_felt[at], step[at], self.target.spacing)
+                change = there @ frames.transpose(0, 2, 1)
+                offset = np.einsum("mab,mb->ma", change, positions[at] - feet[at])
+                turned = Rotation.from_matrix(change @ turns[at]).as_quat()
+                line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
+                carried.append(line)
+        return tuple(carried), lost
+
+    def _feet(self, positions: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The reference's surface under tools (m, 3) whose tails point along `axes` (m, 3)."""
+        reference = self.reference
+        count = min(32, len(reference.points))
+        _, near = reference.tree.query(positions, count)
+        towards = np.einsum("mka,ma->mk", reference.normals[near], axes) > 0.0
+        # The nearest point that faces the tool: the first True, or the nearest of all.
+        first = near[np.arange(len(near)), towards.argmax(axis=1)]
+        start, normals = reference.points[first], reference.normals[first]
+        height = np.einsum("ma,ma->m", positions - start, normals)
+        sideways = positions - start - height[:, None] * normals
+        length = np.linalg.norm(sideways, axis=1, keepdims=True)
+        sideways *= np.minimum(1.0, 2 * reference.spacing / np.maximum(length, 1e-12))
+        return reference.project(start + sideways, normals)
+
+
+def _frames(
+    points: np.ndarray, normals: np.ndarray, alone: np.ndarray, spacing: float
+) -> np.ndarray:
+    """Frames (n, 3, 3) of travel and normal along a line; `alone` (n, 3) is the travel of one
+    that stands still."""
+    moves = len(points) > 1 and float(np.ptp(points, axis=0).max()) > 0.5 * spacing
+    travel = travel_of(points, _SMOOTH * spacing) if moves else alone
+    return surface_frames(travel, normals)
+
+
+def _runs(good: np.ndarray) -> list[np.ndarray]:
+    """Indices of each unbroken stretch of True."""
+    places = np.flatnonzero(good)
+    if not len(places):
+        return []
+    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
