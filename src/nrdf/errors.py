@@ -45,6 +45,12 @@ class OutputError(NrdfError):
     """An output folder that is not empty, or that cannot be written."""
 
 
+class LimitError(NrdfError):
+    """A limit that the user set on a result is not met; the result is there all the same."""
+
+    exit_code = 3
+
+
 def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> str:
     """Message for a name that is not known: "no {kind} '{name}'; known: a, b, c"."""
     return f"no {kind} '{name}'; known: {', '.join(known) if known else '(none)'}"

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.process.frames import surface_frames, travel_of
 from nrdf.process.surface import Surface, unit
+from nrdf.process.taught import TaughtLine, feet_under
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.model import Embedded, Taught
 
@@ -23,14 +24,6 @@ FARTHEST, BEYOND = 0.08, 0.02
 sideways, beyond its edge or in a hole. A waypoint farther away has no counterpart."""
 _KEPT = 0.01  # of that sideways share, what is kept
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
-
-
-@dataclass(frozen=True)
-class TaughtLine:
-    """A line of waypoints: positions (n, 3), m, and quaternions_xyzw (n, 4), tool to object."""
-
-    positions: np.ndarray
-    quaternions_xyzw: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -111,7 +104,7 @@ class Correspondence:
         quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
         owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
         turns = Rotation.from_quat(quaternions).as_matrix()
-        feet, normals = self._feet(positions, -turns[:, :, 2])
+        feet, normals = feet_under(self.reference, positions, -turns[:, :, 2])
         felt = self.reference.smooth_normals(feet, normals, tool_radius_m)
         found, found_normals, exists = self.places(feet, normals)
         found_felt = self.target.smooth_normals(found, found_normals, tool_radius_m)
@@ -133,21 +126,6 @@ class Correspondence:
                 line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
                 carried.append(line)
         return tuple(carried), lost
-
-    def _feet(self, positions: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The reference's surface under tools (m, 3) whose tails point along `axes` (m, 3)."""
-        reference = self.reference
-        count = min(32, len(reference.points))
-        _, near = reference.tree.query(positions, count)
-        towards = np.einsum("mka,ma->mk", reference.normals[near], axes) > 0.0
-        # The nearest point that faces the tool: the first True, or the nearest of all.
-        first = near[np.arange(len(near)), towards.argmax(axis=1)]
-        start, normals = reference.points[first], reference.normals[first]
-        height = np.einsum("ma,ma->m", positions - start, normals)
-        sideways = positions - start - height[:, None] * normals
-        length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        sideways *= np.minimum(1.0, 2 * reference.spacing / np.maximum(length, 1e-12))
-        return reference.project(start + sideways, normals)
 
 
 def _frames(

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from nrdf.cloud import write_cloud
 from nrdf.output import REPORT, write_json
@@ -19,8 +18,8 @@ from nrdf.process.lesson import checksum, overlaps
 from nrdf.process.limits import Limits
 from nrdf.process.page import write_page
 from nrdf.process.report import report_of
-from nrdf.process.toolpath import Job, Segment, write_job
-from nrdf.process.transfer import Transferred
+from nrdf.process.toolpath import Job, write_job
+from nrdf.process.transfer import Transferred, touched
 from nrdf.regions.files import write_matches
 
 KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
@@ -77,15 +76,10 @@ def panel_of(transferred: Transferred, title: str, note: str = "") -> Panel:
     for step in transferred.paths:
         if step.path is not None:
             work = [s for s in step.path.segments if s.kind == "process"]
-            drawn = [_touched(segment, step.process.standoff_m) for segment in work]
+            height = step.process.standoff_m
+            drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
             lines.setdefault(step.region, []).extend(drawn)
     return Panel(title, transferred.target.points, transferred.target.normals, regions, note, lines)
-
-
-def _touched(segment: Segment, standoff_m: float) -> np.ndarray:
-    """The places (n, 3) on the surface that a tool at some height points at."""
-    along = Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
-    return np.asarray(segment.positions + standoff_m * along)
 
 
 def _knowledge(transferred: Transferred, folder: Path, origin: Mapping[str, Any]) -> Knowledge:

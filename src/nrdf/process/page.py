@@ -13,6 +13,7 @@ import numpy as np
 
 from nrdf.picture import Panel, region_colours, render_details
 from nrdf.ply import write_atomically
+from nrdf.process.report import FIGURES, figures
 from nrdf.units import in_words
 
 _DETAIL = 400  # pixels, drawn at half of it
@@ -50,10 +51,7 @@ dl { display: grid; grid-template-columns: auto 1fr; gap: 1px 12px; margin: 6px 
 code { font-size: 12.5px; word-break: break-word; }
 @media print { .path, .card { break-inside: avoid; } body { padding: 0; } }
 """
-_COLUMNS = (
-    "region", "process", "confidence", "coverage", "overlap", "line spacing<br>mean · worst",
-    "off surface<br>99 % · worst", "axis off<br>99 %", "length", "time",
-)  # fmt: skip
+_COLUMNS = ("region", "process", "confidence", *FIGURES)
 
 
 def write_page(path: Path, report: Mapping[str, Any], panel: Panel, picture: Path) -> None:
@@ -130,7 +128,9 @@ def _note(kind: str, title: str, lines: Sequence[str]) -> str:
 
 def _table(report: Mapping[str, Any], colours: Mapping[str, str]) -> str:
     text = ' class="text"'
-    head = "".join(f"<th{text * (i < 2)}>{name}</th>" for i, name in enumerate(_COLUMNS))
+    head = "".join(
+        f"<th{text * (i < 2)}>{name.replace(', ', '<br>')}</th>" for i, name in enumerate(_COLUMNS)
+    )
     rows = []
     for path in report["paths"]:
         confidence = report["regions"][path["region"]]["confidence"]
@@ -143,30 +143,10 @@ def _table(report: Mapping[str, Any], colours: Mapping[str, str]) -> str:
             why = escape(path["left_out_because"] or "")
             rows.append(f'<tr class="none">{first}<td class="text" colspan="7">{why}</td></tr>')
             continue
-        cells = "".join(f"<td>{cell}</td>" for cell in measured(path["measures"]))
+        cells = "".join(f"<td>{cell}</td>" for cell in figures(path["measures"]))
         rows.append(f"<tr>{first}{cells}</tr>")
     table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
     return f'<div class="wide"><table>{table}</table></div>'
-
-
-def measured(measures: Mapping[str, Any]) -> list[str]:
-    """A tool path's figures as people read them: coverage, overlap, line spacing, distance from
-    the surface, axis' error, length on the surface, time."""
-
-    def both(one: float | None, other: float | None) -> str:
-        if one is None or other is None:
-            return "–"
-        return f"{1e3 * one:.1f} · {1e3 * other:.1f} mm"
-
-    return [
-        f"{measures['coverage']:.1%}",
-        f"{measures['overlap']:.0%}",
-        both(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"]),
-        both(measures["surface_distance_99_m"], measures["surface_distance_worst_m"]),
-        f"{np.degrees(measures['axis_error_99_rad']):.1f}°",
-        f"{measures['process_length_m']:.2f} m",
-        f"{measures['cycle_time_s']:.0f} s",
-    ]
 
 
 def _details(

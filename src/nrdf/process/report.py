@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,11 @@ from nrdf.units import in_words
 
 DOUBTFUL = 0.5
 """Confidence below which a region that was found should be looked at."""
+FIGURES = (
+    "coverage", "overlap", "line spacing, mean · worst", "off surface, 99 % · worst",
+    "axis off, 99 %", "length", "time",
+)  # fmt: skip
+SHORT_FIGURES = ("coverage", "widest lines", "off surface", "axis off", "time")
 _LEAST_COVERAGE = 0.97
 _WIDEST_LINES = 1.15  # times the stepover
 _FARTHEST_M = 0.001
@@ -129,3 +135,31 @@ def measure_warnings(process: Process, measures: Measures) -> list[str]:
         error = in_words("error_rad", measures.axis_error_99_rad)
         lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
     return lines
+
+
+def figures(measures: Mapping[str, Any]) -> list[str]:
+    """A tool path's measures as people read them, one for each of `FIGURES`."""
+    coverage, _, _, axis, time = short_figures(measures)
+    length = f"{measures['process_length_m']:.2f} m"
+    spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
+    away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
+    return [coverage, f"{measures['overlap']:.0%}", spacing, away, axis, length, time]
+
+
+def short_figures(measures: Mapping[str, Any]) -> list[str]:
+    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+    return [
+        f"{measures['coverage']:.1%}",
+        _millimetres(measures["line_spacing_worst_m"]),
+        _millimetres(measures["surface_distance_99_m"]),
+        f"{np.degrees(measures['axis_error_99_rad']):.1f}°",
+        f"{measures['cycle_time_s']:.0f} s",
+    ]
+
+
+def _millimetres(*lengths: float | None) -> str:
+    """Lengths in metres side by side in millimetres; a dash where one is missing."""
+    known = [length for length in lengths if length is not None]
+    if len(known) < len(lengths):
+        return "–"
+    return " · ".join(f"{1e3 * length:.1f}" for length in known) + " mm"

@@ -10,17 +10,18 @@ import time
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import ModelError, ProcessError
-from nrdf.process.carry import Correspondence, TaughtLine
+from nrdf.process.carry import Correspondence
 from nrdf.process.coverage import Measures, measure
-from nrdf.process.frames import tool_quaternions, travel_of
 from nrdf.process.knowledge import Line, Process, Transfer
 from nrdf.process.lesson import Lesson, overlaps
 from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.surface import Surface
+from nrdf.process.taught import TaughtLine, taught_lines
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.regions.model import Embedded, Match, Model
 
@@ -134,7 +135,7 @@ class Teacher:
         if (region, number) not in self._lines:
             process = self._process(region, number)
             if process.waypoints is not None:
-                lines = tuple(self._taught(line, process) for line in process.waypoints)
+                lines = taught_lines(process, self.surface)
             else:
                 inside = working(self.taught.reference, self.lesson.regions[region])
                 once = replace(strategy_of(process), passes=1)
@@ -146,22 +147,15 @@ class Teacher:
             self._lines[region, number] = lines
         return self._lines[region, number]
 
+    def contacts(self, region: str, number: int) -> list[np.ndarray]:
+        """The places (n, 3) on the reference's surface that each line of a process works."""
+        height = self._process(region, number).standoff_m
+        lines = self.lines(region, number)
+        return [touched(line.positions, line.quaternions_xyzw, height) for line in lines]
+
     def _process(self, region: str, number: int) -> Process:
         named = {r.name: r for r in self.lesson.knowledge.regions}
         return named[region].processes[number]
-
-    def _taught(self, line: Line, process: Process) -> TaughtLine:
-        positions = np.array(line.positions_m, float)
-        if line.quaternions_xyzw is not None:
-            return TaughtLine(positions, np.array(line.quaternions_xyzw, float))
-        nearest = self.surface.tree.query(positions)[1]
-        normals = self.surface.project(positions, self.surface.normals[nearest])[1]
-        if len(positions) > 1:
-            travel = travel_of(positions, 2 * self.surface.spacing)
-        else:
-            travel = np.array([process.direction or (1.0, 0.0, 0.0)])
-        turns = tool_quaternions(travel, normals, process.lead_rad, process.tilt_rad)
-        return TaughtLine(positions, turns)
 
     def _path(
         self, region: str, number: int, process: Process, found: FoundRegion, way: Correspondence
@@ -206,6 +200,12 @@ class Teacher:
 def surface_of(embedded: Embedded) -> Surface:
     """The surface of a cloud in metres, of the points that the field works on."""
     return Surface(embedded.original(embedded.points), embedded.normals)
+
+
+def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
+    """The places (n, 3) that tools at positions (n, 3), some height over a surface, point at."""
+    along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
+    return np.asarray(positions + standoff_m * along)
 
 
 def with_normals(embedded: Embedded) -> PointCloud:
