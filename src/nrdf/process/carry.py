@@ -8,21 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from nrdf.geometry import thin
 from nrdf.process.frames import surface_frames, travel_of
 from nrdf.process.surface import Surface, unit
 from nrdf.process.taught import TaughtLine, feet_under
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.model import Embedded, Taught
+from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
-FARTHEST, BEYOND = 0.08, 0.02
-"""Shares of the target's longest side that C's place may be off the target's surface, in all and
-sideways, beyond its edge or in a hole. A waypoint farther away has no counterpart."""
-_KEPT = 0.01  # of that sideways share, what is kept
+FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.03, 0.3
+"""A waypoint has a counterpart where C's place is at most so far off the target's surface, in all
+and sideways (beyond an edge, or in a hole), as shares of the longest side, and C trusts it."""
+_KEPT = 0.01  # of what a place lies beyond the surface sideways; the rest is its edge
+_ANCHORS = 1200  # points of the reference whose places are settled
+_BLENDED, _BLEND = 8, 0.005  # anchors that a place follows, and the distance that softens it
+_SETTLING = RegistrationSettings(
+    iterations=8,
+    radius_start=0.3,
+    radius_end=0.15,
+    normal_weight_start=0.15,
+    normal_weight_end=0.1,
+    match_scale=0.06,
+)
+"""Chosen on unseen family pairs (`nrdf eval carry`)."""
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
 
 
@@ -36,20 +50,58 @@ class CarriedLine(TaughtLine):
     waypoints: np.ndarray
 
 
-class Correspondence:
-    """The way from a reference's surface to a target's.
+class TaughtSurface:
+    """A reference as waypoints are carried from it: as the field sees it, and as a surface."""
 
-    taught, embedded: reference and target as the field sees them, both in metres. reference,
-    target: their surfaces, of the points that the field works on.
+    def __init__(self, taught: Taught) -> None:
+        self.taught = taught
+        self.surface = surface_of(taught.reference)
+
+    @cached_property
+    def anchors(self) -> np.ndarray:
+        """Even points (a,) of the working cloud whose places on a target are settled."""
+        return thin(self.taught.reference.points, _ANCHORS, np.random.default_rng(0))
+
+    @cached_property
+    def template(self) -> RegistrationTemplate:
+        """The anchors, ready to be moved."""
+        reference, at = self.taught.reference, self.anchors
+        return RegistrationTemplate(reference.points[at], reference.normals[at], _SETTLING)
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The anchors in position and normal."""
+        reference, at = self.taught.reference, self.anchors
+        return cKDTree(
+            oriented_features(reference.points[at], reference.normals[at], NORMAL_WEIGHT)
+        )
+
+
+class Correspondence:
+    """The way from a reference's surface to a target's, both in metres.
+
+    C's places are settled: a smooth, small displacement, the same as in registration, brings the
+    whole mapped reference and the target closer, both ways, so that edges come to lie on edges.
     """
 
-    def __init__(
-        self, taught: Taught, embedded: Embedded, reference: Surface, target: Surface
-    ) -> None:
-        self.taught, self.embedded = taught, embedded
-        self.reference, self.target = reference, target
+    def __init__(self, reference: TaughtSurface, embedded: Embedded) -> None:
+        self.reference, self.embedded = reference, embedded
+        self.target = surface_of(embedded)
         features = oriented_features(embedded.points, embedded.normals, NORMAL_WEIGHT)
         self._tree = cKDTree(features)
+
+    @cached_property
+    def _settled(self) -> np.ndarray:
+        """Displacement (a, 3) of each anchor's place, canonical."""
+        reference, embedded = self.reference, self.embedded
+        mapped = reference.taught.map_surface(embedded)
+        start = mapped.points[reference.anchors]
+        facing = unit(mapped.normals[reference.anchors])
+        at = thin(embedded.points, 2 * _ANCHORS, np.random.default_rng(1))
+        moved = reference.template.register(
+            embedded.points[at], embedded.normals[at], (start, facing)
+        )
+        return np.asarray(moved.points - start)
 
     def places(
         self, points: np.ndarray, normals: np.ndarray
@@ -57,21 +109,25 @@ class Correspondence:
         """Where places (m, 3) of the reference's surface, with normals (m, 3), are on the target.
 
         Returns places on its smooth surface (m, 3), normals there (m, 3), and whether the place
-        exists (m,): C's own place lies near the surface.
+        exists (m,): the field trusts it, and it lies near the surface.
         """
-        embedded = self.embedded
-        mapped = self.taught.map_places(points, normals, embedded)
+        embedded, whole = self.embedded, self.reference.taught.reference
+        mapped = self.reference.taught.map_places(points, normals, embedded)
+        asked = oriented_features((points - whole.centre) / whole.scale, normals, NORMAL_WEIGHT)
+        distance, near = self.reference.tree.query(asked, _BLENDED)
+        weight = 1.0 / (distance + _BLEND) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._settled[near])
         facing = unit(mapped.normals)
-        features = oriented_features(mapped.points, facing, NORMAL_WEIGHT)
-        nearest = self._tree.query(features)[1]
+        nearest = self._tree.query(oriented_features(arrived, facing, NORMAL_WEIGHT))[1]
         start, outward = embedded.points[nearest], embedded.normals[nearest]
-        offset = mapped.points - start
+        offset = arrived - start
         sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
         length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        near = start + sideways * np.minimum(1.0, _KEPT / np.maximum(length, 1e-12))
-        found, found_normals = self.target.project(embedded.original(near), outward)
+        kept = start + sideways * np.minimum(1.0, _KEPT / np.maximum(length, 1e-12))
+        found, found_normals = self.target.project(embedded.original(kept), outward)
         exists = (np.linalg.norm(offset, axis=1) <= FARTHEST) & (length[:, 0] <= BEYOND)
-        return found, found_normals, exists
+        return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
 
     def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """A direction (3,) at a region of the reference, unit length, as it is on the target.
@@ -79,8 +135,9 @@ class Correspondence:
         region: (k,) indices into the reference's cloud. The smooth map between the two regions is
         taken as affine; across the surface, where points do not tell, as a turn and a scale.
         """
-        here = self.taught.reference.cloud.points[region]
-        there = self.embedded.original(self.taught.map_points(region, self.embedded).points)
+        taught = self.reference.taught
+        here = taught.reference.cloud.points[region]
+        there = self.embedded.original(taught.map_points(region, self.embedded).points)
         here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
         turn, _ = Rotation.align_vectors(there, here) if len(here) > 2 else (Rotation.identity(), 0)
         scale = np.sqrt((there**2).sum() / max((here**2).sum(), 1e-18))
@@ -100,25 +157,24 @@ class Correspondence:
         """
         if not lines:
             return (), 0
+        source = self.reference.surface
         positions = np.concatenate([line.positions for line in lines])
         quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
         owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
         turns = Rotation.from_quat(quaternions).as_matrix()
-        feet, normals = feet_under(self.reference, positions, -turns[:, :, 2])
-        felt = self.reference.smooth_normals(feet, normals, tool_radius_m)
+        feet, normals = feet_under(source, positions, -turns[:, :, 2])
+        felt = source.smooth_normals(feet, normals, tool_radius_m)
         found, found_normals, exists = self.places(feet, normals)
         found_felt = self.target.smooth_normals(found, found_normals, tool_radius_m)
         # Where there is no line to tell the travel, a short way along tool x is mapped.
-        ahead, ahead_normals = self.reference.project(
-            feet + 2 * self.reference.spacing * turns[:, :, 0], normals
-        )
+        ahead, ahead_normals = source.project(feet + 2 * source.spacing * turns[:, :, 0], normals)
         step = self.places(ahead, ahead_normals)[0] - found
         carried, lost = [], int((~exists).sum())
         for number in range(len(lines)):
             mine = np.flatnonzero(owner == number)
             for run in _runs(exists[mine]):
                 at = mine[run]
-                frames = _frames(feet[at], felt[at], turns[at, :, 0], self.reference.spacing)
+                frames = _frames(feet[at], felt[at], turns[at, :, 0], source.spacing)
                 there = _frames(found[at], found_felt[at], step[at], self.target.spacing)
                 change = there @ frames.transpose(0, 2, 1)
                 offset = np.einsum("mab,mb->ma", change, positions[at] - feet[at])
@@ -126,6 +182,11 @@ class Correspondence:
                 line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
                 carried.append(line)
         return tuple(carried), lost
+
+
+def surface_of(embedded: Embedded) -> Surface:
+    """The surface of a cloud in metres, of the points that the field works on."""
+    return Surface(embedded.original(embedded.points), embedded.normals)
 
 
 def _frames(

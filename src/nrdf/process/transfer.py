@@ -14,13 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import ModelError, ProcessError
-from nrdf.process.carry import Correspondence
+from nrdf.process.carry import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Line, Process, Transfer
 from nrdf.process.lesson import Lesson, overlaps
 from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
-from nrdf.process.surface import Surface
 from nrdf.process.taught import TaughtLine, taught_lines
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.regions.model import Embedded, Match, Model
@@ -89,7 +88,8 @@ class Teacher:
             )
         self.lesson, self.model = lesson, model
         self.taught = model.set_reference(lesson.cloud)
-        self.surface = surface_of(self.taught.reference)
+        self.reference = TaughtSurface(self.taught)
+        self.surface = self.reference.surface
         self._lines: dict[tuple[str, int], tuple[TaughtLine, ...]] = {}
 
     def transfer(self, target: PointCloud, min_confidence: float = MIN_CONFIDENCE) -> Transferred:
@@ -105,8 +105,7 @@ class Teacher:
         found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
         seconds = {"regions": time.perf_counter() - start}
         start = time.perf_counter()
-        surface = surface_of(embedded)
-        way = Correspondence(self.taught, embedded, self.surface, surface)
+        way = Correspondence(self.reference, embedded)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
         paths = tuple(
@@ -195,11 +194,6 @@ class Teacher:
         waypoints = [Line(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn]
         changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
         return process.model_copy(update=changes), segments, warnings
-
-
-def surface_of(embedded: Embedded) -> Surface:
-    """The surface of a cloud in metres, of the points that the field works on."""
-    return Surface(embedded.original(embedded.points), embedded.normals)
 
 
 def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
