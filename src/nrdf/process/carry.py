@@ -22,10 +22,11 @@ from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.model import Embedded, Taught
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
-FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.03, 0.3
-"""A waypoint has a counterpart where C's place is at most so far off the target's surface, in all
-and sideways (beyond an edge, or in a hole), as shares of the longest side, and C trusts it."""
-_KEPT = 0.01  # of what a place lies beyond the surface sideways; the rest is its edge
+FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
+"""A waypoint has a counterpart where C's place is at most so far off the target's points, in all
+and sideways (beyond an edge, or in a hole), as shares of the longest side, not counting the
+distance between points; and where C trusts it."""
+_KEPT = 1.2  # spacings of points that a place may lie beside one; what is more lies off the edge
 _ANCHORS = 1200  # points of the reference whose places are settled
 _BLENDED, _BLEND = 8, 0.005  # anchors that a place follows, and the distance that softens it
 _SETTLING = RegistrationSettings(
@@ -124,9 +125,11 @@ class Correspondence:
         offset = arrived - start
         sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
         length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        kept = start + sideways * np.minimum(1.0, _KEPT / np.maximum(length, 1e-12))
+        spacing = self.target.spacing / embedded.scale
+        kept = start + sideways * np.minimum(1.0, _KEPT * spacing / np.maximum(length, 1e-12))
         found, found_normals = self.target.project(embedded.original(kept), outward)
-        exists = (np.linalg.norm(offset, axis=1) <= FARTHEST) & (length[:, 0] <= BEYOND)
+        exists = np.linalg.norm(offset, axis=1) <= FARTHEST + spacing
+        exists &= length[:, 0] <= BEYOND + spacing
         return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
 
     def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -139,11 +142,13 @@ class Correspondence:
         here = taught.reference.cloud.points[region]
         there = self.embedded.original(taught.map_points(region, self.embedded).points)
         here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
-        turn, _ = Rotation.align_vectors(there, here) if len(here) > 2 else (Rotation.identity(), 0)
-        scale = np.sqrt((there**2).sum() / max((here**2).sum(), 1e-18))
-        similar = scale * turn.as_matrix()
         spread = here.T @ here
-        ridge = 0.05 * np.trace(spread) / 3.0 * np.eye(3)
+        size = float(np.trace(spread))
+        if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
+            return unit(np.asarray(direction, float))
+        turn, _ = Rotation.align_vectors(there, here)
+        similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
+        ridge = 0.05 * size / 3.0 * np.eye(3)
         affine = np.linalg.solve(spread + ridge, here.T @ there + ridge @ similar.T).T
         return unit(affine @ unit(np.asarray(direction, float)))
 
