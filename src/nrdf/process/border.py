@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from nrdf.process.grid import Grid
 
 OWN, OTHER, CONTEXT = 0, 1, 2
 """Labels of a patch's points: its own; of another patch of the region; of no region."""
 # All in spacings. Between points spread at random, no gap is wider than twice _CLOSED, and places
-# farther than _EMPTY from all of them join to areas above _HOLE once in twenty objects of 2000.
-_CLOSED, _EMPTY, _HOLE = 1.7, 0.9, 10.0
-_RIM = 0.5  # how far the surface goes on beyond its last points
-_VOTE, _BLUR = 0.8, 0.4  # blurs of the vote between labels, and of the outline
+# farther than _EMPTY from all points join to areas above _HOLE in fewer than one region in twenty
+# (of 2000 points).
+_CLOSED, _EMPTY, _HOLE = 1.7, 0.9, 12.0
+_RIM = 0.58  # how far the surface goes on beyond its last points
+_VOTE, _BLUR = 0.8, 0.6  # blurs of the vote between labels, and of the outline
 
 
 class Border:
@@ -33,50 +33,70 @@ class Border:
         votes = [self.grid.density(uv[label == k], _VOTE * spacing) for k in (OWN, OTHER, CONTEXT)]
         own, other, context = votes
         vote = _balance(own + other, context) * unit
-        self._region = ndimage.gaussian_filter(np.minimum(surface, vote), _BLUR * unit)
-        self._mine = _balance(own, other)
-        outline = _outline(self.grid, self._region)
-        self._seam = None
+        region = ndimage.gaussian_filter(np.minimum(surface, vote), _BLUR * unit)
+        stray = ndimage.binary_fill_holes(region > 0.0) & (region <= 0.0)
+        region[stray & ~_large(stray, unit)] = 0.5
+        self._distance = self._mine = _signed_distance(region, self.grid.pitch)
         if (label == OTHER).any():
-            outline = outline[self.grid.sample(self._mine, outline) > 0.0]
-            seam = _outline(self.grid, self._mine)
-            self._seam = _tree(seam[self.grid.sample(self._region, seam) > 0.0])
-        self._outline = _tree(outline)
+            mine = _balance(own, other)
+            self._mine = np.minimum(self._distance, _signed_distance(mine, self.grid.pitch))
+            # Beyond the seam there is no border where merely the known points end.
+            self._distance = _signed_distance(np.where(mine < 0.0, unit, region), self.grid.pitch)
 
     def distance(self, uv: np.ndarray) -> np.ndarray:
-        """Distance (m,) of places uv (m, 2) from the region's border, m; below 0 outside."""
-        return self._signed(self._region, self._outline, uv)
+        """Distance of places uv (..., 2) from the region's border, m, (...); below 0 outside."""
+        return self.grid.sample(self._distance, uv)
 
     def clearance(self, uv: np.ndarray, margin_m: float) -> np.ndarray:
-        """How far (m,) places uv (m, 2) are inside what the patch has to work, m.
+        """How far places uv (..., 2) are inside what the patch has to work, m, (...).
 
         That is the region without `margin_m` along its border, up to the neighbouring patches.
         """
-        inside = self.distance(uv) - margin_m
-        if self._seam is None:
-            return inside
-        return np.minimum(inside, self._signed(self._mine, self._seam, uv))
+        return np.minimum(self.distance(uv) - margin_m, self.grid.sample(self._mine, uv))
 
-    def _signed(self, field: np.ndarray, line: cKDTree | None, uv: np.ndarray) -> np.ndarray:
-        flat = uv.reshape(-1, 2)
-        sign = np.where(self.grid.sample(field, flat) > 0.0, 1.0, -1.0)
-        far = np.full(len(flat), np.inf) if line is None else line.query(flat)[0]
-        return (sign * far).reshape(uv.shape[:-1])
-
-
-def _tree(points: np.ndarray) -> cKDTree | None:
-    return cKDTree(points) if len(points) else None
+    @property
+    def deepest(self) -> float:
+        """Distance of the innermost place from the border, m."""
+        return float(self._distance.max())
 
 
 def _surface(grid: Grid, uv: np.ndarray, spacing: float) -> np.ndarray:
     """How far inside the surface each node is, in cells, about; below 0 outside and in holes."""
     unit = spacing / grid.pitch
-    away = cKDTree(uv).query(grid.nodes.reshape(-1, 2))[0].reshape(grid.shape) / grid.pitch
+    away = _away(grid, uv)
     empty = away > _EMPTY * unit
     solid = ndimage.binary_fill_holes(away < _CLOSED * unit)
     closed = ndimage.distance_transform_edt(solid) - (_CLOSED - _RIM) * unit
     hole = ndimage.binary_dilation(_large(empty & (closed > 0.0), unit), iterations=int(unit))
     return np.where(hole, np.minimum(closed, _RIM * unit - away), closed)
+
+
+def _away(grid: Grid, uv: np.ndarray) -> np.ndarray:
+    """Distance of every node from the nearest of the points uv (n, 2), in cells."""
+    place = (uv - grid.origin)[:, ::-1] / grid.pitch
+    cell = tuple(np.rint(place).astype(int).T)
+    nearest = np.zeros((*grid.shape, 2))
+    nearest[cell] = place
+    vacant = np.ones(grid.shape, bool)
+    vacant[cell] = False
+    row, column = ndimage.distance_transform_edt(
+        vacant, return_distances=False, return_indices=True
+    )
+    return np.linalg.norm(nearest[row, column] - np.moveaxis(np.indices(grid.shape), 0, -1), axis=2)
+
+
+def _signed_distance(field: np.ndarray, pitch: float) -> np.ndarray:
+    """Distance (m) of every node from where a field passes 0; below 0 where the field is."""
+    slope = np.hypot(*np.gradient(field))
+    # How far a node next to the line is from it, in cells.
+    short = np.clip(np.abs(field) / np.maximum(slope, 1e-12), 0.0, 1.0)
+    distance = np.full(field.shape, np.inf)
+    for side in (field > 0.0, field <= 0.0):
+        if side.all():
+            return np.where(side & (field > 0.0), np.inf, -np.inf)
+        far, (row, column) = ndimage.distance_transform_edt(side, return_indices=True)
+        distance[side] = (far - short[row, column])[side]
+    return pitch * np.where(field > 0.0, distance, -distance)
 
 
 def _large(mask: np.ndarray, unit: float) -> np.ndarray:
@@ -92,12 +112,3 @@ def _balance(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     total = one + other
     least = 1e-6 * total.max()
     return (one - other + least) / (total + least)
-
-
-def _outline(grid: Grid, field: np.ndarray) -> np.ndarray:
-    """Points (m, 2), a third of the grid's pitch apart, of the lines on which the field is 0."""
-    # A contour has a point on every edge of the grid that it crosses.
-    shares = np.arange(3)[:, None, None] / 3.0
-    lines = grid.contours(field, 0.0)
-    fine = [(line[:-1] + shares * np.diff(line, axis=0)).reshape(-1, 2) for line in lines]
-    return np.concatenate([np.empty((0, 2)), *fine])

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.process.grid import Grid
 from nrdf.process.patch import Patch
-from nrdf.process.raster import Stroke
+from nrdf.process.raster import Stroke, strip_middles
 
 
 def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
@@ -42,7 +42,7 @@ def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke
         slope = np.stack(np.gradient(depth, grid.pitch)[::-1], axis=-1)
         strokes, end = [], rings[0][0][0]
         for chain in _chains(rings, stepover_m):
-            strokes.append(_wound(chain, grid, depth, slope, stepover_m, end))
+            strokes.append(_wound(chain, grid, depth, slope, end))
             end = strokes[-1][-1]
         parts.append(strokes)
     return parts
@@ -60,11 +60,11 @@ def _rings(
     for part in range(1, count + 1):
         near = ndimage.binary_dilation(parts == part, np.ones((3, 3)), iterations=2)
         depth = ndimage.gaussian_filter(np.where(near, clear, -grid.pitch), 1.0)
-        deepest = float(depth.max())
-        number = int(np.floor(max(deepest - 0.5 * patch.spacing, 0.0) / stepover)) + 1
-        first = 0.5 * max(deepest - stepover * (number - 1), 0.0)
-        levels = first + stepover * np.arange(number)
-        rings = [[_anticlockwise(r) for r in grid.contours(depth, level)] for level in levels]
+        levels = strip_middles(float(depth.max()), stepover)
+        rings = [
+            [_smooth(_anticlockwise(ring), 0.4 * stepover) for ring in grid.contours(depth, level)]
+            for level in levels
+        ]
         rings = [level for level in rings if level]
         if rings:
             found.append((rings, grid, depth))
@@ -75,6 +75,15 @@ def _anticlockwise(ring: Stroke) -> Stroke:
     x, y = ring.T
     area = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
     return ring if area > 0.0 else ring[::-1]
+
+
+def _smooth(ring: Stroke, reach: float) -> Stroke:
+    """A closed ring with its corners, and what the ragged border has left in it, rounded."""
+    step = np.linalg.norm(np.diff(ring, axis=0), axis=1).mean()
+    # Short rings would shrink to nothing.
+    sigma = min(reach / step, 0.05 * len(ring))
+    round_ = ndimage.gaussian_filter1d(ring[:-1], sigma, axis=0, mode="wrap")
+    return np.concatenate([round_, round_[:1]])
 
 
 def _started_near(ring: Stroke, place: np.ndarray) -> Stroke:
@@ -112,7 +121,6 @@ def _wound(
     grid: Grid,
     depth: np.ndarray,
     slope: np.ndarray,
-    stepover: float,
     end: np.ndarray,
 ) -> Stroke:
     """One stroke along a chain of rings, each turn sinking by a stepover."""
@@ -120,13 +128,17 @@ def _wound(
     pieces = [ring]
     for inner in chain[1:]:
         walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
-        wanted = grid.sample(depth, ring) + stepover * walked / walked[-1]
-        turn = ring
+        here, there = (float(grid.sample(depth, r).mean()) for r in (ring, inner))
+        wanted = here + (there - here) * walked / walked[-1]
+        turn, farthest = ring, 2.0 * abs(there - here)
         for _ in range(4):
             by = np.stack([grid.sample(slope[..., a], turn) for a in (0, 1)], axis=-1)
             steep = np.maximum((by**2).sum(axis=1), 0.25)
             missing = wanted - grid.sample(depth, turn)
-            turn = turn + by * (missing / steep)[:, None]
+            move = turn + by * (missing / steep)[:, None] - ring
+            # Where the depth has a ridge there is no way down on the other side.
+            length = np.linalg.norm(move, axis=1, keepdims=True)
+            turn = ring + move * np.minimum(1.0, farthest / np.maximum(length, 1e-12))
         pieces.append(turn[1:])
         ring = _started_near(inner, turn[-1])
     if len(chain) > 1:

@@ -45,21 +45,24 @@ def surface_frames(travel: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.stack([np.cross(y, z), y, z], axis=-1)
 
 
-def lean(frames: np.ndarray, lead_rad: float, tilt_rad: float) -> np.ndarray:
-    """Upright tool frames (n, 3, 3) leaned: first by the lead, then by the tilt.
+def lean_rotation(lead_rad: float, tilt_rad: float) -> Rotation:
+    """The turn of a tool in its own upright frame that leans it: first by lead, then by tilt.
 
     A positive lead leans the tool's tail (the end away from the part) towards the travel, a
     positive tilt to its right; they turn about tool y by -lead and then about tool x by tilt.
     """
-    return frames @ Rotation.from_euler("YX", [-lead_rad, tilt_rad]).as_matrix()
+    return Rotation.from_euler("YX", [-lead_rad, tilt_rad])
 
 
 def tool_quaternions(
     travel: np.ndarray, normals: np.ndarray, lead_rad: float = 0.0, tilt_rad: float = 0.0
 ) -> np.ndarray:
-    """Unit quaternions (n, 4), x y z w, of `lean` on `surface_frames`, without jumps of sign."""
-    frames = lean(surface_frames(travel, normals), lead_rad, tilt_rad)
-    return steady(Rotation.from_matrix(frames).as_quat())
+    """Unit quaternions (n, 4), x y z w, of leaned tools, without jumps of sign.
+
+    travel, normals: (n, 3), as for `surface_frames`; lead and tilt as for `lean_rotation`.
+    """
+    upright = Rotation.from_matrix(surface_frames(travel, normals))
+    return steady((upright * lean_rotation(lead_rad, tilt_rad)).as_quat())
 
 
 def steady(quaternions: np.ndarray) -> np.ndarray:

@@ -13,12 +13,12 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.process.border import CONTEXT, OTHER, OWN, Border
-from nrdf.process.surface import Surface, quadrics, unit
+from nrdf.process.surface import Surface, quadrics, typical_spacing, unit
 from nrdf.process.unroll import Unrolled, unroll
 
 log = logging.getLogger(__name__)
 
-_FEWEST = 6  # points of a patch
+_FEWEST = 4  # points of a patch
 _BENT, _BENT_SHARE = 0.2, 0.03  # a patch with more of its points bent this much is cut in two
 _DEEPEST = 5  # cuts
 _SCRAP = 0.03  # smaller shares are not cut off
@@ -29,10 +29,12 @@ _FITTED = 20
 class Patch:
     """A connected piece of a region that lies flat without folds, with what surrounds it.
 
-    points: (n, 3), m; uv: (n, 2), m, their places in the plane; tangents: (n, 2, 3), unit, along u
-    and v; label: (n,), OWN, OTHER or CONTEXT; spacing: typical distance between points, m.
+    index: (n,) of its points among the surface's; points: (n, 3), m; uv: (n, 2), m, their places
+    in the plane; tangents: (n, 2, 3), unit, along u and v; label: (n,), OWN, OTHER or CONTEXT;
+    spacing: typical distance between points, m.
     """
 
+    index: np.ndarray
     points: np.ndarray
     uv: np.ndarray
     tangents: np.ndarray
@@ -111,7 +113,8 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
         own, depth = waiting.pop()
         if len(own) < _FEWEST:
             continue
-        for hops in (2, 1, 0):  # less context where it closes a tube or goes round an edge
+        # No context where it closes a tube or goes round an edge.
+        for hops in (1 if depth else 2, 0):
             around = _surroundings(surface, own, hops)
             edges = _edges_within(surface, around)
             flat = unroll(surface.points[around], surface.normals[around], edges, surface.spacing)
@@ -136,26 +139,22 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
     if scattered:
         log.debug("%d scattered points of a region of %d have no lines", scattered, len(region))
     return tuple(
-        _patch(surface.points[around], flat, owner[around], k, len(found), surface.spacing)
+        _patch(surface, around, flat, _labels(owner[around], k, len(found)))
         for k, (_, around, flat) in enumerate(found)
     )
 
 
-def _patch(
-    points: np.ndarray,
-    flat: Unrolled,
-    owner: np.ndarray,
-    number: int,
-    scattered: int,
-    typical: float,
-) -> Patch:
-    label = np.full(len(points), OTHER)
-    label[owner == -1] = CONTEXT
-    label[(owner == number) | (owner == scattered)] = OWN
-    count = min(5, len(points))
+def _labels(owner: np.ndarray, patch: int, nobody: int) -> np.ndarray:
+    """Labels (n,) from the patch that owns each point: -1 where none of the region does."""
+    label = np.where(owner == -1, CONTEXT, OTHER)
+    return np.where((owner == patch) | (owner == nobody), OWN, label)
+
+
+def _patch(surface: Surface, around: np.ndarray, flat: Unrolled, label: np.ndarray) -> Patch:
+    count = min(5, len(around))
     distance = cKDTree(flat.uv).query(flat.uv[label == OWN], count)[0][:, -1]
-    spacing = float(np.median(distance) * np.sqrt(np.pi / (count - 0.5)))
-    return Patch(points, flat.uv, flat.tangents, label, min(spacing, 1.3 * typical))
+    spacing = min(typical_spacing(distance, count - 1), 1.3 * surface.spacing)
+    return Patch(around, surface.points[around], flat.uv, flat.tangents, label, spacing)
 
 
 def _components(surface: Surface, chosen: np.ndarray) -> list[np.ndarray]:
@@ -208,6 +207,6 @@ def _halves(surface: Surface, own: np.ndarray) -> list[np.ndarray]:
             side = vote + np.bincount(i, vote[j], len(own)) > 0.0
         for half in (True, False):  # scraps go to the other side
             part = _components_of(edges[(side[edges] == half).all(axis=1)], len(own))
-            small = np.bincount(part)[part] < max(2 * _FEWEST, _SCRAP * len(own))
+            small = np.bincount(part)[part] < max(12, _SCRAP * len(own))
             side = side ^ (small & (side == half))
     return [part for half in (own[side], own[~side]) for part in _components(surface, half)]

@@ -107,7 +107,7 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
             sweep += [[next(found) for _ in part] for part in parts]
         blocks += _nearest_first(sweep)
     if not blocks:
-        deepest = max(float(p.border.distance(p.border.grid.nodes).max()) for p in patches)
+        deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
             f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
             f"innermost place is {deepest:.3g} m from its border; give less than that"
@@ -218,8 +218,8 @@ def _lines(
         count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
         at = np.linspace(0.0, walked[-1], count + 1)
         even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
-    contacts, along = patch.at(np.concatenate(even))
-    outward = unit(np.cross(along[:, 0], along[:, 1]))
+    flat, along = patch.at(np.concatenate(even))
+    contacts, outward = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
     normals = surface.smooth_normals(contacts, outward, strategy.tool_radius_m)
     cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
     return [

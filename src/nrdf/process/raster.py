@@ -13,10 +13,11 @@ Stroke = np.ndarray
 
 
 def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
-    """Lines across a patch, `stepover_m` apart along the surface, at `angle` (rad) in its plane.
+    """Lines across a patch, at `angle` (rad) in its plane, even along the surface.
 
     One list for each connected part of the patch inside its margin, in snake order; lines are
-    broken where the surface is. A part's lines are centred on it.
+    broken where the surface is. A part is cut into even strips no wider than `stepover_m`, and each
+    has its line in the middle.
     """
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     uv = patch.uv @ turn.T
@@ -39,6 +40,12 @@ def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> li
         if found:
             strokes.append([stroke @ turn for stroke in found])
     return strokes
+
+
+def strip_middles(width: float, stepover: float) -> np.ndarray:
+    """Middles (n,) of the fewest even strips, no wider than a stepover, that make up a width."""
+    count = max(int(np.ceil(width / stepover - 0.02)), 1)
+    return width * (np.arange(count) + 0.5) / count
 
 
 def distance_from_row(
@@ -77,9 +84,7 @@ def _part(
     margin: float,
 ) -> list[Stroke]:
     low, high = across[inside].min(), across[inside].max()
-    # Half a spacing is what the border is known to; a line in it would be in tatters.
-    count = int(np.floor(max(high - low - patch.spacing, 0.0) / stepover)) + 1
-    levels = 0.5 * (low + high) + stepover * (np.arange(count) - 0.5 * (count - 1))
+    levels = low + strip_middles(high - low, stepover)
     near = ndimage.binary_dilation(inside, np.ones((3, 3)))
     columns = np.flatnonzero(near.any(axis=0))
     u = grid.origin[0] + grid.pitch * columns
@@ -89,7 +94,7 @@ def _part(
     free = patch.border.clearance(lines @ turn, margin)
     free = np.where(grid.sample(near.astype(float), lines) > 0.0, free, -grid.pitch)
     strokes: list[Stroke] = []
-    for number in range(count):
+    for number in range(len(levels)):
         row = _stretches(lines[number], free[number])
         strokes += row if number % 2 == 0 else [stretch[::-1] for stretch in row[::-1]]
     return strokes

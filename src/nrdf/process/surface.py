@@ -18,7 +18,8 @@ MOST_POINTS = 30_000
 """A larger cloud is thinned evenly: finer points than a tool can follow only cost time."""
 SAME_SIDE = 0.5
 """Least cosine between the normals of points that may belong to one sheet."""
-_NEIGHBOURS = 10
+_LEVEL = 0.7  # the same for points that one quadric is fitted to
+_NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED = 20
 
 
@@ -70,13 +71,13 @@ class Surface:
 
     @cached_property
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.tree.query(self.points, min(_NEIGHBOURS + 1, len(self.points)))
+        return self.tree.query(self.points, min(_ASKED + 1, len(self.points)))
 
     @cached_property
     def spacing(self) -> float:
         """Typical distance between points, m: the side of the square that each has to itself."""
-        distance = self._nearest[0][:, -1]
-        return float(np.median(distance) * np.sqrt(np.pi / self._nearest[0].shape[1]))
+        count = min(8, len(self.points) - 1)
+        return typical_spacing(self._nearest[0][:, count], count)
 
     @cached_property
     def edges(self) -> np.ndarray:
@@ -86,17 +87,17 @@ class Surface:
         out, so that no edge leads through a thin part.
         """
         distance, near = self._nearest
-        i = np.repeat(np.arange(len(near)), near.shape[1] - 1)
-        j, length = near[:, 1:].ravel(), distance[:, 1:].ravel()
-        along = self.points[j] - self.points[i]
-        rise = np.maximum(
-            np.abs(np.einsum("ea,ea->e", along, self.normals[i])),
-            np.abs(np.einsum("ea,ea->e", along, self.normals[j])),
-        )
-        alike = np.einsum("ea,ea->e", self.normals[i], self.normals[j]) > SAME_SIDE
-        good = alike & (rise <= 0.6 * length) & (length < 3.0 * self.spacing) & (i != j)
-        pair = np.sort(np.stack([i[good], j[good]], axis=1), axis=1)
-        return np.unique(pair, axis=0)
+        along = self.points[near] - self.points[:, None]
+        rise = np.abs(np.einsum("nka,na->nk", along, self.normals))
+        rise = np.maximum(rise, np.abs(np.einsum("nka,nka->nk", along, self.normals[near])))
+        alike = np.einsum("nka,na->nk", self.normals[near], self.normals) > SAME_SIDE
+        good = alike & (rise <= 0.6 * distance) & (distance < 3.0 * self.spacing)
+        good[:, 0] = False
+        good &= np.cumsum(good, axis=1) <= _NEIGHBOURS
+        i, k = np.nonzero(good)
+        pair = np.sort(np.stack([i, near[i, k]], axis=1), axis=1)
+        code = np.unique(pair[:, 0] * len(self.points) + pair[:, 1])
+        return np.stack(np.divmod(code, len(self.points)), axis=1)
 
     def project(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nearest places on the smooth surface, and its normals there, each (m, 3).
@@ -106,8 +107,13 @@ class Surface:
         side (Alexa et al., 2003). A point with no surface of its side around stays where it is.
         """
         points, normals = np.array(points, dtype=np.float64), unit(normals)
+        near = self._nearest_to(points, 2 * _FITTED)
         for _ in range(2):
-            near, weight = self._same_side(points, normals, 2 * _FITTED, 3.0 * self.spacing)
+            distance, facing = self._seen(points, normals, near)
+            good = facing > _LEVEL
+            good &= np.cumsum(good, axis=1) <= _FITTED
+            reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
+            weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * facing**2
             enough = (weight > 0).sum(axis=1) >= 6
             mean = np.einsum("mk,mka->ma", weight, self.normals[near])
             normals = np.where(enough[:, None], unit(mean), normals)
@@ -116,6 +122,7 @@ class Surface:
             scale = self.spacing
             found = quadrics(offset[..., :2] / scale, offset[..., 2:], weight)
             height, slope = found[:, 0, 0], found[:, 1:3, 0] / scale
+            height = np.clip(height, -scale, scale)  # beyond an edge, quadrics run away
             points = points + np.where(enough, height, 0.0)[:, None] * normals
             tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
             normals = np.where(enough[:, None], unit(tilted), normals)
@@ -124,27 +131,43 @@ class Surface:
     def smooth_normals(
         self, points: np.ndarray, normals: np.ndarray, radius_m: float
     ) -> np.ndarray:
-        """Outward normals (m, 3), averaged over the sheet within `radius_m` of points (m, 3).
+        """Outward normals (m, 3), averaged over what faces a tool at points (m, 3).
 
-        normals: (m, 3), roughly outward, tell the side. What a flat tool of that radius feels.
+        That is the sheet within `radius_m` that faces the average itself, found from `normals`
+        (m, 3), which tell the side: what a flat tool of that radius feels.
         """
         radius = max(radius_m, 2.0 * self.spacing)
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
-        near, weight = self._same_side(points, unit(normals), count, radius)
-        mean = np.einsum("mk,mka->ma", weight, self.normals[near])
-        found = np.asarray(weight.any(axis=1))[:, None]
-        return np.where(found, unit(mean), unit(normals))
+        points, normals = np.asarray(points, dtype=np.float64), unit(normals)
+        near = self._nearest_to(points, count)
+        for _ in range(6):
+            distance, facing = self._seen(points, normals, near)
+            weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
+            mean = np.einsum("mk,mka->ma", weight, self.normals[near])
+            normals = np.where(weight.any(axis=1)[:, None], unit(mean), normals)
+        return normals
 
-    def _same_side(
-        self, points: np.ndarray, normals: np.ndarray, count: int, radius: float
+    def _nearest_to(self, points: np.ndarray, count: int) -> np.ndarray:
+        return self.tree.query(points, min(count, len(self.points)))[1]
+
+    def _seen(
+        self, points: np.ndarray, normals: np.ndarray, near: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Indices and weights (m, k) of the points around, 0 for those of another sheet."""
-        distance, near = self.tree.query(points, min(count, len(self.points)))
+        """Distances of the cloud points `near` (m, k), and cosines of their normals to `normals`
+        (m, 3), 0 for points of another sheet."""
+        offset = self.points[near] - points[:, None]
+        distance = np.sqrt(np.einsum("mka,mka->mk", offset, offset))
         facing = np.einsum("mka,ma->mk", self.normals[near], normals)
-        rise = np.einsum("mka,ma->mk", self.points[near] - points[:, None], normals)
-        good = (facing > SAME_SIDE) & (np.abs(rise) < 0.6 * distance + self.spacing)
-        weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing * good
-        return near, weight
+        rise = np.abs(np.einsum("mka,ma->mk", offset, normals))
+        good = (facing > SAME_SIDE) & (rise < 0.6 * distance + self.spacing)
+        return distance, np.where(good, facing, 0.0)
+
+
+def typical_spacing(distance: np.ndarray, number: int) -> float:
+    """Side of the square that each point has to itself, from the distances (n,) of the points'
+    `number`-th neighbours."""
+    # Of points spread at random, half have that neighbour within this area.
+    return float(np.median(distance) * np.sqrt(np.pi / (number - 1.0 / 3.0)))
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -171,5 +194,5 @@ def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.n
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
     weighted = basis * weight[..., None]
     normal = np.einsum("mki,mkj->mij", weighted, basis)
-    normal += np.diag([1e-9, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3])
+    normal += np.diag([1e-9, 1e-5, 1e-5, 3e-3, 3e-3, 3e-3])
     return np.linalg.solve(normal, np.einsum("mki,mkc->mic", weighted, values))
