@@ -24,6 +24,7 @@ from nrdf.process.quantities import (
     Quaternion,
     Vector,
 )
+from nrdf.regions.region import REGION_NAME
 
 VERSION: Final = 1
 Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
@@ -34,8 +35,7 @@ WITHOUT_CONTACT = ("paint", "inspect")
 
 
 def _region_name(text: str) -> str:
-    # A region's name becomes a file name.
-    if not all(c.isalnum() or c in "_ .+-" for c in text) or not text[:1].isalnum():
+    if not REGION_NAME.fullmatch(text):
         raise ValueError(
             "a region's name becomes a file name: letters, digits, spaces and any of . + - _"
         )

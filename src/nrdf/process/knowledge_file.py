@@ -62,6 +62,11 @@ def parse_knowledge(text: str, origin: str, as_json: bool = False) -> Knowledge:
             f"{origin} has version {version}, from a newer nrdf; this one reads version {VERSION}: "
             "update nrdf"
         )
+    return validated(content, origin)
+
+
+def validated(content: dict[str, Any], origin: str) -> Knowledge:
+    """Knowledge from a mapping as a file holds it. Raises ProcessError listing every fault."""
     try:
         return Knowledge.model_validate(content)
     except ValidationError as error:

@@ -10,6 +10,7 @@ from typing import Any, get_args
 from nrdf.cloud import check_cloud, read_cloud
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.knowledge import Kind, Knowledge
+from nrdf.process.knowledge_file import validated
 from nrdf.process.lesson import bind, checksum, known_unit
 from nrdf.regions.files import read_regions
 from nrdf.regions.model import MINIMUM_POINTS
@@ -77,8 +78,8 @@ def new_knowledge(
     known = known_unit(cloud, unit, category, str(reference), "--unit")
     rows = []
     for path in regions:
-        names = list(read_regions([path], known))
-        rows += [{"name": name, "file": _relative(path, folder)} for name in names]
+        found = read_regions([path], known)
+        rows += [{"name": name, "file": _relative(path, folder)} for name in found]
     rows = rows or [{"name": PLACEHOLDER, "file": f"{PLACEHOLDER}.ply"}]
     if len(kinds) not in (1, len(rows)):
         raise ProcessError(
@@ -97,7 +98,7 @@ def new_knowledge(
             for row, kind in zip(rows, every, strict=True)
         ],
     }
-    knowledge = Knowledge.model_validate(content)
+    knowledge = validated(content, "the new file")
     if regions:
         bind(knowledge, folder, "the new file")
     return knowledge

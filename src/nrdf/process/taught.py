@@ -36,7 +36,8 @@ def taught_lines(process: Process, surface: Surface) -> tuple[TaughtLine, ...]:
     lines = []
     for number, line in enumerate(process.waypoints or (), 1):
         positions = np.array(line.positions_m, float)
-        away = surface.tree.query(positions)[0]
+        # What lies between points is on the surface.
+        away = np.maximum(surface.tree.query(positions)[0] - surface.spacing, 0.0)
         if (away > allowed).any():
             worst = int(away.argmax())
             raise ProcessError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
 from nrdf.picture import region_colours
 from nrdf.regions.model import Match
+from nrdf.regions.region import REGION_NAME
 from nrdf.units import METRES
 
 
@@ -30,7 +30,7 @@ def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np
         for name, values in read_region_file(path, unit).items():
             if name in regions:
                 raise RegionError(f"two regions are called '{name}'; rename one of the files")
-            if not re.fullmatch(r"\w[\w .+-]*", name):
+            if not REGION_NAME.fullmatch(name):
                 raise RegionError(
                     f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
                     "any of . + - _ are allowed, because it becomes a file name"
