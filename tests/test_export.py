@@ -104,6 +104,29 @@ def test_urscript_presses_exactly_where_the_job_does(wild, tmp_path):
     assert text.index("zero_ftsensor()") < text.index("run nrdf_press()")
 
 
+def test_a_tcp_that_is_known_is_set_and_said(tmp_path):
+    half = np.sqrt(0.5)
+    first, second = (
+        replace(path, tcp_m=(0.0, 0.01, 0.12), tcp_quaternion_xyzw=(half, 0.0, 0.0, half),
+                force_tolerance_n=2.5)
+        for path in wild_job().paths
+    )  # fmt: skip
+    job = replace(wild_job(), paths=(first, second))
+    formats = ["urscript", "rapid", "json"]
+    export_job(job, formats, tmp_path)
+    (script,) = (tmp_path / "urscript").iterdir()
+    text = script.read_text()
+    assert text.count(f"set_tcp(p[0.0000000, 0.0100000, 0.1200000, {np.pi / 2:.8f}, ") == 2
+    assert "and its TCP set?" not in text and "force within 2.500 N" in text
+    (module,) = (tmp_path / "rapid").glob("*.mod")
+    assert "TCP 0.000 10.000 120.000 mm" in " ".join(module.read_text().split())
+    (content,) = (tmp_path / "json").iterdir()
+    assert json.loads(content.read_text())["paths"][0]["tcp_m"] == [0.0, 0.01, 0.12]
+    export_job(job, ["urscript"], tmp_path / "out", Options(tool_z="out"))
+    (script,) = (tmp_path / "out" / "urscript").iterdir()
+    assert f"{-np.pi / 2:.8f}" in script.read_text().split("set_tcp", 1)[1].split("\n")[0]
+
+
 def test_urscript_pushes_the_other_way_when_tool_z_points_out(wild, tmp_path):
     paths = read_urscript(written(wild, "urscript", tmp_path, Options(tool_z="out")))
     compare(wild, paths, turn=HALF_TURN_ABOUT_X)

@@ -22,7 +22,7 @@ def random_job():
     paths = (
         ToolPath("Sitzfläche", "sand", "disc 125", np.float64(0.0625), segments, 300.0, {"a": [1]}),
         ToolPath("back", "inspect", "camera", 0.01, segments[:1]),
-        ToolPath("legs", "oil", "pad", 0.01, ()),
+        ToolPath("legs", "oil", "pad", 0.01, (), None, {}, (0.1, 0.0, 0.2), (0.6, 0.8, 0, 0), 2.5),
     )
     return Job("chair", "cell", paths)
 
@@ -43,9 +43,11 @@ def test_a_job_comes_back_exactly(tmp_path):
         read = read_job(place)
         assert (read.category, read.frame) == ("chair", "cell")
         for path, again in zip(job.paths, read.paths, strict=True):
-            for name in ("region", "process", "tool", "tool_radius_m", "spindle_rad_s"):
+            for name in (
+                "region", "process", "tool", "tool_radius_m", "spindle_rad_s", "parameters",
+                "tcp_m", "tcp_quaternion_xyzw", "force_tolerance_n",
+            ):  # fmt: skip
                 assert getattr(again, name) == getattr(path, name)
-            assert again.parameters == path.parameters
             for segment, same in zip(path.segments, again.segments, strict=True):
                 for name in ("kind", "line", "feed_m_s", "force_n", "dwell_s"):
                     assert getattr(same, name) == getattr(segment, name)

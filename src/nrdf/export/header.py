@@ -61,6 +61,10 @@ def _describe(path: ToolPath) -> str:
     text = f"radius {1000 * path.tool_radius_m:.3f} mm"
     if path.spindle_rad_s is not None:
         text += f", spindle {revolutions_per_minute(path.spindle_rad_s):.1f} rpm"
+    if path.tcp_m is not None:
+        text += f", TCP {' '.join(f'{1000 * x:.3f}' for x in path.tcp_m)} mm in the flange's frame"
+    if path.force_tolerance_n is not None:
+        text += f", force within {path.force_tolerance_n:.3f} N"
     waypoints = sum(len(segment.positions) for segment in path.segments)
     return text + f", segments: {len(path.segments)}, waypoints: {waypoints}"
 

@@ -56,6 +56,8 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
                     else len(segment.positions),
                 }
             )
+        optional = ("tcp_m", "tcp_quaternion_xyzw", "force_tolerance_n")
+        known = {n: getattr(path, n) for n in optional if getattr(path, n) is not None}
         paths.append(
             {
                 "region": path.region,
@@ -64,6 +66,7 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
                 "tool_radius_m": float(path.tool_radius_m),
                 "spindle_rad_s": path.spindle_rad_s,
                 "parameters": path.parameters,
+                **known,
                 "segments": segments,
             }
         )

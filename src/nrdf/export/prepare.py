@@ -65,7 +65,11 @@ def _prepare_path(path: ToolPath, options: Options, tool_z: ToolZ) -> ToolPath:
             turned = tool_z_out(segment.quaternions_xyzw)
             segment = replace(segment, quaternions_xyzw=turned)
         segments.append(segment)
-    return replace(path, tool=options.tool or path.tool, segments=tuple(segments))
+    tcp = path.tcp_quaternion_xyzw
+    if tcp is not None and tool_z == "out":
+        tcp = tuple(tool_z_out(np.array([tcp]))[0].tolist())
+    tool = options.tool or path.tool
+    return replace(path, tool=tool, segments=tuple(segments), tcp_quaternion_xyzw=tcp)
 
 
 def strokes(path: ToolPath, blend_m: float) -> list[Stroke]:

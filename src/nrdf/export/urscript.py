@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from nrdf.export.header import (
     commented,
     header,
@@ -47,8 +49,9 @@ def write(job: Job, options: Options, folder: Path) -> None:
     for i, (procedure, path) in enumerate(zip(procedures, job.paths, strict=True), start=1):
         lines += [f"  def {procedure}():", *commented([path_title(path, i)], "    # ")]
         if path.tool != mounted:
-            lines += _change_tool(path.tool)
+            lines += _change_tool(path)
             mounted = path.tool
+        lines += _set_tcp(path)
         lines += [f"    {line}" for line in _path(path, options)] + ["  end"]
     save(folder / f"{name}.script", [*lines, *(f"  {p}()" for p in procedures), "end"])
 
@@ -68,13 +71,27 @@ def _shared() -> list[str]:
     ]
 
 
-def _change_tool(tool: str) -> list[str]:
-    """A stop: a program cannot know the TCP of a second tool."""
-    name = plain_text(tool)
+def _change_tool(path: ToolPath) -> list[str]:
+    """A stop: a program cannot mount a second tool, or know its payload."""
+    name = plain_text(path.tool)
+    if path.tcp_m is not None:
+        return [
+            f"    # Set the payload of {name} here: set_payload(...)",
+            f'    popup("{name}: is it mounted?", title="nrdf", blocking=True)',
+        ]
     return [
         f"    # Set the TCP and payload of {name} here: set_tcp(p[...]), set_payload(...)",
         f'    popup("{name}: is it mounted, and its TCP set?", title="nrdf", blocking=True)',
     ]
+
+
+def _set_tcp(path: ToolPath) -> list[str]:
+    """The tool centre point, where it is known."""
+    if path.tcp_m is None:
+        return []
+    turned = rotation_vectors(np.array(path.tcp_quaternion_xyzw or (0.0, 0.0, 0.0, 1.0)))
+    values = ", ".join(numbers(path.tcp_m, 7) + numbers(turned, 8))
+    return [f"    set_tcp(p[{values}])"]
 
 
 def _path(path: ToolPath, options: Options) -> list[str]:

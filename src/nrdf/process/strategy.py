@@ -51,4 +51,7 @@ def tool_path(region: str, process: Process, segments: Sequence[Segment]) -> Too
         segments=tuple(segments),
         spindle_rad_s=process.spindle_rad_s,
         parameters=dict(process.parameters),
+        tcp_m=process.tool.tcp_m,
+        tcp_quaternion_xyzw=process.tool.tcp_quaternion_xyzw,
+        force_tolerance_n=process.force_tolerance_n,
     )

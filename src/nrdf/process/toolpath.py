@@ -57,6 +57,8 @@ class ToolPath:
     region: its name. process: its kind ("sand", "paint", ...). tool: the tool's name.
     tool_radius_m: radius of its footprint. spindle_rad_s: None where nothing turns.
     segments: in the order in which they are driven. parameters: free custom parameters.
+    tcp_m, tcp_quaternion_xyzw: the tool frame in the robot's flange frame, None where not known.
+    force_tolerance_n: how far the contact force may be off.
     """
 
     region: str
@@ -66,6 +68,9 @@ class ToolPath:
     segments: tuple[Segment, ...]
     spindle_rad_s: float | None = None
     parameters: dict[str, Any] = field(default_factory=dict)
+    tcp_m: tuple[float, float, float] | None = None
+    tcp_quaternion_xyzw: tuple[float, float, float, float] | None = None
+    force_tolerance_n: float | None = None
 
 
 @dataclass(frozen=True)
@@ -194,6 +199,9 @@ class _PathContent(Strict):
     segments: list[_SegmentContent]
     spindle_rad_s: _AtLeastZero | None = None
     parameters: dict[str, Any] = Field(default_factory=dict)
+    tcp_m: _Position | None = None
+    tcp_quaternion_xyzw: _Quaternion | None = None
+    force_tolerance_n: _AboveZero | None = None
 
     def made(self, where: str) -> ToolPath:
         content = {name: getattr(self, name) for name in type(self).model_fields}
