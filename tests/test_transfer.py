@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import nrdf
-from nrdf.cloud import PointCloud
+from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import ModelError
+from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.transfer import Teacher, working
 from taught_box import SAND, SIZE, cloud, faces, lesson
 
@@ -137,6 +138,24 @@ def test_normals_are_estimated_for_all_points_and_kept(model):
     facing = np.einsum("na,na->n", result.target.normals, whole.normals)
     assert np.quantile(facing, 0.2) > 0.9
     assert result.paths[0].measures.coverage > 0.9
+
+
+def test_a_target_in_another_unit_is_brought_to_metres(model):
+    there = cloud(seed=1)
+    far = PointCloud(1000 * there.points + 5000, there.normals, unit="mm", frame="cell")
+    result = Teacher(lesson({"top": [SAND]}), model).transfer(far)
+    assert (result.target.unit, result.target.frame) == ("m", "cell")
+    positions = np.concatenate([s.positions for s in process_segments(result.paths[0])])
+    np.testing.assert_allclose(positions[:, 1], 5 + SIZE[1] / 2, atol=5e-3)
+
+
+def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
+    write_cloud(tmp_path / "box.ply", cloud())
+    write_knowledge(tmp_path / "box.yaml", lesson({"top": [SAND]}).knowledge)
+    teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
+    teacher.transfer(cloud(seed=1)).write(tmp_path / "job")
+    assert (tmp_path / "job" / "report.html").exists()
+    assert teacher.lesson.knowledge.regions[0].name == "top"
 
 
 def test_points_in_use_are_found_again(model):

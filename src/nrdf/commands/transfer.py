@@ -68,19 +68,19 @@ def transfer(
     with output_folder(out, overwrite) as folder:
         import nrdf
         from nrdf.process.job_folder import write_transfer
-        from nrdf.process.lesson import in_metres, known_unit, read_lesson
+        from nrdf.process.lesson import known_unit, read_lesson
         from nrdf.process.transfer import MIN_CONFIDENCE, Teacher
 
         lesson = read_lesson(knowledge)
         category = lesson.knowledge.category
         cloud = nrdf.read_cloud(target)
-        cloud = in_metres(cloud, known_unit(cloud, unit, category, str(target), "--unit"))
+        known = known_unit(cloud, unit, category, str(target), "--unit")
         loaded = nrdf.load_model(model or category, device)
         with errors.status("reference"):
             teacher = Teacher(lesson, loaded)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
-            transferred = teacher.transfer(cloud, least)
+            transferred = teacher.transfer(cloud, known, least)
         origin = {
             "command": command_line(),
             "knowledge": str(knowledge),

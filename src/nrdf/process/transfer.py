@@ -1,6 +1,10 @@
 """Process knowledge transferred to a new object: regions found, tool paths planned or carried.
 
 A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any number of targets.
+
+    teacher = nrdf.teach("chair.yaml")
+    job = teacher.transfer(nrdf.read_cloud("new.ply"))
+    job.write("job/")
 """
 
 from __future__ import annotations
@@ -8,16 +12,18 @@ from __future__ import annotations
 import logging
 import time
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import ModelError, ProcessError
+from nrdf.output import output_folder
 from nrdf.process.carry import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Line, Process, Transfer
-from nrdf.process.lesson import Lesson, overlaps
+from nrdf.process.lesson import Lesson, in_metres, known_unit, overlaps
 from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught import TaughtLine, taught_lines
@@ -72,6 +78,17 @@ class Transferred:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
 
+    def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
+        """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
+
+        Raises OutputError if it is not empty, without `overwrite`, or cannot be written.
+        """
+        from nrdf.process.job_folder import write_transfer
+        from nrdf.process.limits import Limits
+
+        with output_folder(path, overwrite) as folder:
+            write_transfer(folder, self, Limits(), title, {})
+
 
 class Teacher:
     """Knowledge on its reference, as a model sees it.
@@ -92,13 +109,21 @@ class Teacher:
         self.surface = self.reference.surface
         self._lines: dict[tuple[str, int], tuple[TaughtLine, ...]] = {}
 
-    def transfer(self, target: PointCloud, min_confidence: float = MIN_CONFIDENCE) -> Transferred:
-        """Find the regions on a target, in metres, and bring every process there.
+    def transfer(
+        self,
+        target: PointCloud,
+        unit: str | None = None,
+        min_confidence: float = MIN_CONFIDENCE,
+    ) -> Transferred:
+        """Find the regions on a target, and bring every process there.
 
-        A region that is found nowhere, or with less mean confidence than `min_confidence`, is
-        skipped; a process that does not fit its region there is left out with the reason. Raises
-        CloudError for a target that cannot be used.
+        unit: of the target, where its file did not say. A region that is found nowhere, or with
+        less mean confidence than `min_confidence`, is skipped; a process that does not fit its
+        region there is left out with the reason. Raises CloudError for a target that cannot be
+        used, ProcessError for one whose unit nothing tells.
         """
+        category = self.lesson.knowledge.category
+        target = in_metres(target, known_unit(target, unit, category, "the target", "unit"))
         start = time.perf_counter()
         embedded = self.model.embed(target)
         matches = self.taught.retrieve_all(self.lesson.regions, embedded)
