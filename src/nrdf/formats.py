@@ -16,11 +16,11 @@ import numpy as np
 
 from nrdf import ply
 from nrdf.errors import CloudError, DataError
+from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
 
 KNOWN_FORMATS = "PLY, XYZ/TXT/CSV/ASC/PTS, PCD, NPY, NPZ, OFF, OBJ, STL"
-_UNITS = ("m", "cm", "mm", "in")
 
 
 @dataclass
@@ -74,7 +74,7 @@ def _read_ply(path: Path, mesh_samples: int) -> RawCloud:
                 "x, y and z are needed"
             )
         cloud = RawCloud(points, _columns(columns, ("nx", "ny", "nz")))
-    return replace(cloud, unit=unit if unit in _UNITS else None, frame=said.get("frame"))
+    return replace(cloud, unit=unit if unit in METRES else None, frame=said.get("frame"))
 
 
 def _columns(columns: Mapping[str, np.ndarray], names: str | tuple[str, ...]) -> np.ndarray | None:

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score methods: on scans (bsrc), on exact truth (families), on the shapes themselves (shape).
+    """Score methods: on scans (bsrc), exact truth (families, carry), shapes themselves (shape).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
+    from nrdf.commands.evaluate_carry import carry
     from nrdf.commands.evaluate_shape import shape
 
-    return {"bsrc": bsrc, "families": families, "shape": shape}
+    return {"bsrc": bsrc, "families": families, "carry": carry, "shape": shape}
 
 
 def bsrc(

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from nrdf.commands.console import command_line, console, provenance, show, table, versions
-from nrdf.errors import RegionError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,11 +64,12 @@ def retrieve(
         clock = Clock()
         import nrdf
         from nrdf.picture import draw_regions
+        from nrdf.regions.files import read_regions, write_matches
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
         reference_cloud, target_cloud = nrdf.read_cloud(reference), nrdf.read_cloud(target)
-        regions = read_regions(region)
+        regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
@@ -119,48 +118,6 @@ class Clock:
         return sum(self.seconds.values())
 
 
-def read_regions(paths: tuple[Path, ...]) -> dict[str, np.ndarray]:
-    """Regions by name from files: points (m, 3), masks (n,) or indices (m,).
-
-    Raises RegionError for no file, arrays that cannot be read, names that occur twice or cannot be
-    file names, and CloudError for unreadable clouds.
-    """
-    regions: dict[str, np.ndarray] = {}
-    if not paths:
-        raise RegionError("no region given; name at least one file after --region")
-    for path in paths:
-        for name, values in _read_region_file(path).items():
-            if name in regions:
-                raise RegionError(f"two regions are called '{name}'; rename one of the files")
-            if not re.fullmatch(r"\w[\w .+-]*", name):
-                raise RegionError(
-                    f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
-                    "any of . + - _ are allowed, because it becomes a file name"
-                )
-            regions[name] = values
-    return regions
-
-
-def _read_region_file(path: Path) -> dict[str, np.ndarray]:
-    import zipfile
-
-    import numpy as np
-
-    from nrdf.cloud import read_cloud
-
-    if path.suffix.lower() in (".npy", ".npz"):
-        try:
-            with open(path, "rb") as file:
-                loaded = np.load(file, allow_pickle=False)
-                if isinstance(loaded, np.ndarray):
-                    return {path.stem: loaded}
-                if "points" not in loaded:
-                    return {name: loaded[name] for name in loaded.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise RegionError(f"cannot read the region file {path}: {error}") from None
-    return {path.stem: read_cloud(path).points}
-
-
 def reference_indices(
     regions: Mapping[str, np.ndarray], reference: PointCloud
 ) -> dict[str, np.ndarray]:
@@ -176,26 +133,6 @@ def region_panel(
     from nrdf.picture import Panel
 
     return Panel(title, cloud.points, cloud.normals, dict(regions), note)
-
-
-def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
-    """Write <region>.ply for each match into a folder."""
-    import numpy as np
-
-    from nrdf.cloud import write_cloud
-    from nrdf.picture import region_colours
-
-    colours = region_colours(list(matches))
-    for name, match in matches.items():
-        # Paler where less certain.
-        strength = 0.25 + 0.75 * match.confidence[:, None]
-        mixed = strength * colours[name] + (1 - strength)
-        write_cloud(
-            folder / f"{name}.ply",
-            target.select(match.indices),
-            colours=(255 * mixed).astype(np.uint8),
-            scalars={"confidence": match.confidence, "index": match.indices},
-        )
 
 
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:

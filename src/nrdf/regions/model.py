@@ -224,12 +224,19 @@ class Taught:
             if surface is not None:
                 return Mapped(*(values[indices] for values in surface))
             return self._invert(target, self._k[:, indices], reference.normals[indices])
-        points = (reference.cloud.points[indices] - reference.centre) / reference.scale
         nearest = reference.nearest_working[indices]
         given = reference.cloud.normals
         normals = reference.normals[nearest] if given is None else given[indices]
-        mapped = self._invert(target, self._describe(points, normals), normals)
+        mapped = self.map_places(reference.cloud.points[indices], normals, target)
         return mapped if surface is None else mapped.shifted(surface.moved[nearest])
+
+    def map_places(self, points: np.ndarray, normals: np.ndarray, target: Embedded) -> Mapped:
+        """Where any places of the reference's surface arrive on a target.
+
+        points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
+        """
+        canonical = (points - self.reference.centre) / self.reference.scale
+        return self._invert(target, self._describe(canonical, normals), normals)
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped

@@ -71,17 +71,20 @@ class RegistrationTemplate:
         self._kernels = [np.exp(-squared / (0.5 * r * r)) for r in self.settings.radii()]
 
     def register(
-        self, target_points: Array, target_normals: Array, begin: tuple[Array, Array] | None = None
+        self, target_points: Array, target_normals: Array, start: tuple[Array, Array] | None = None
     ) -> Registration:
         """Move the template onto a target given by points (m, 3) and unit normals (m, 3).
 
-        begin: where the template's points are to begin, (n, 3), and the normals that they have
-        there, (n, 3), instead of what `settings.start` says and their own.
+        `start`: points and unit normals (n, 3) from which to begin, where something better than
+        the bounding box is known.
         """
         s = self.settings
         target = np.asarray(target_points, np.float32)
         normals = np.asarray(target_normals, np.float32)
-        base, own = (self._begin(target), self.normals) if begin is None else begin
+        if start is None:
+            base, own = self._from_box(target), self.normals
+        else:
+            base, own = (np.asarray(values, np.float32) for values in start)
         moved = base
         balance = len(base) / len(target)
         for kernel, normal_weight in zip(self._kernels, s.normal_weights(), strict=True):
@@ -103,8 +106,8 @@ class RegistrationTemplate:
         distance, index, _, _ = _match(moved, own, target, normals, s.normal_weight_end)
         return Registration(moved.astype(np.float32), index, distance)
 
-    def _begin(self, target: Array) -> Array:
-        """Between the template's own place and its copy in the target's bounding box, (n, 3)."""
+    def _from_box(self, target: Array) -> Array:
+        """The template on its way from its own place to the target's bounding box."""
         low, high = self.points.min(0), self.points.max(0)
         target_low, target_high = target.min(0), target.max(0)
         extent = np.maximum(high - low, 1e-6)
