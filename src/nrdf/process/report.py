@@ -13,7 +13,7 @@ from nrdf.process.limits import Limits
 from nrdf.process.transfer import Transferred, TransferredPath
 from nrdf.units import in_words
 
-DOUBTFUL = 0.5
+DOUBTFUL = 0.4
 """Confidence below which a region that was found should be looked at."""
 FIGURES = (
     "coverage", "overlap", "line spacing, mean · worst", "off surface, 99 % · worst",
