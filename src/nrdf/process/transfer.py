@@ -32,7 +32,7 @@ from nrdf.regions.model import Embedded, Match, Model
 
 log = logging.getLogger(__name__)
 
-MIN_CONFIDENCE = 0.3
+MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
 
 
