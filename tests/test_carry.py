@@ -28,7 +28,8 @@ def taught_on(model, reference, scale):
 
     def places(points, normals, target):
         there = (points * scale - target.centre) / target.scale
-        return Mapped(there, normals, np.ones(len(points)))
+        count = len(points)
+        return Mapped(there, normals, np.ones(count), np.zeros(count), np.zeros((count, 3)))
 
     taught.map_places = places
     taught.map_points = lambda at, target: places(
