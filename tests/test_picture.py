@@ -56,9 +56,10 @@ def test_hidden_region_adds_a_view_from_where_it_is_seen(tmp_path):
     colour = region_colours(["far"])["far"]
     near = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] > 0.8})])
     far = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] < -0.8})])
-    assert far.shape[0] > 1.5 * near.shape[0]
-    half = far.shape[0] // 2
-    assert like(far[half:-50], colour).sum() > 500 > like(far[:half], colour).sum()
+    assert far.shape[1] > 1.5 * near.shape[1]  # beside the first: there is one panel
+    half = far.shape[1] // 2
+    body = far[:-50]  # without the legend
+    assert like(body[:, half:], colour).sum() > 500 > like(body[:, :half], colour).sum()
 
 
 def test_panels_are_side_by_side_and_share_the_colours(tmp_path):
