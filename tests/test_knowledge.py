@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import get_args
 
 import pytest
@@ -253,6 +254,14 @@ def test_the_json_schema_knows_the_other_units():
     for given, is_good in ((SAND, True), ({**SAND, "feed_m_s": 1}, False)):
         either = process["allOf"][0]["oneOf"]
         assert (sum(set(one["required"]) <= set(given) for one in either) == 1) is is_good
+
+
+def test_the_file_in_the_documentation_is_right():
+    text = (Path(__file__).parents[1] / "docs" / "process.md").read_text(encoding="utf-8")
+    (region,) = parse_knowledge(text.split("```yaml\n")[1].split("```")[0], "docs").regions
+    assert [process.kind for process in region.processes] == ["sand", "oil"]
+    fields = set(Process.model_fields) - {"label"}
+    assert all(f"`{field}`" in text for field in fields), "a field that docs/process.md leaves out"
 
 
 def test_names_are_those_of_the_planner_and_of_clouds():

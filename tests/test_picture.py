@@ -6,7 +6,7 @@ import pytest
 
 from nrdf.errors import OutputError
 from nrdf.geometry import fibonacci_directions
-from nrdf.picture import Panel, draw_regions, region_colours, render_panels
+from nrdf.picture import Panel, draw_regions, region_colours, render_details, render_panels
 
 BALL = fibonacci_directions(4000)
 
@@ -56,10 +56,13 @@ def test_hidden_region_adds_a_view_from_where_it_is_seen(tmp_path):
     colour = region_colours(["far"])["far"]
     near = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] > 0.8})])
     far = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] < -0.8})])
-    assert far.shape[1] > 1.5 * near.shape[1]  # beside the first: there is one panel
+    assert far.shape[1] == 2 * near.shape[1]  # one panel: the second view stands beside
     half = far.shape[1] // 2
-    body = far[:-50]  # without the legend
+    body = far[:-50]
     assert like(body[:, half:], colour).sum() > 500 > like(body[:, :half], colour).sum()
+    panels = [Panel("ball", BALL, BALL, {"far": BALL[:, 0] < -0.8})] * 2
+    several = drawn(tmp_path, panels)  # else below
+    assert several.shape[1] == far.shape[1] and several.shape[0] > 1.5 * near.shape[0]
 
 
 def test_panels_are_side_by_side_and_share_the_colours(tmp_path):
@@ -115,3 +118,16 @@ def test_a_line_may_dip_into_its_own_region_only():
 def test_a_region_without_lines_and_lines_without_a_region_are_drawn():
     assert inked([]) == 0
     assert inked([ring(0.9)], {}) > 100
+
+
+def test_details_show_each_region_from_its_side():
+    colours = region_colours(["up", "back"])
+    regions = {"up": BALL[:, 1] > 0.7, "back": BALL[:, 0] < -0.7}
+    shown = render_details(Panel("ball", BALL, BALL, regions), ["up", "back"], 120)
+    for name, image in shown.items():
+        assert image.shape == (120, 120, 3)
+        other = "back" if name == "up" else "up"
+        assert like(image, colours[name]).sum() > 0.3 * 120 * 120
+        assert like(image, colours[other]).sum() < 0.1 * 120 * 120
+    empty = render_details(Panel("ball", BALL, BALL, {"up": BALL[:, 0] > 2}), ["up"], 50)["up"]
+    assert (empty == 1).all()

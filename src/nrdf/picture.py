@@ -96,7 +96,8 @@ def render_panels(
 
 
 def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:
-    """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side."""
+    """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side
+    and with its own lines."""
     every = list(dict.fromkeys((*panel.regions, *panel.lines)))
     table = np.array([*region_colours(every).values(), BASE_COLOUR])
     pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
@@ -113,7 +114,7 @@ def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, n
         corner = (low + high - side) / 2
         near = ((view[:, :2] > corner - 0.05) & (view[:, :2] < corner + side + 0.05)).all(axis=1)
         colours = pale if scene.lines else table
-        drawn = scene.select(near)
+        drawn = scene.select(near, every.index(name))
         return render(drawn, axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
 
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:

@@ -64,10 +64,10 @@ class Scene:
     radius: np.ndarray
     lines: tuple[Strokes, ...] = ()
 
-    def select(self, mask: np.ndarray) -> Scene:
-        """Only the points of a mask (n,), with all lines."""
+    def select(self, mask: np.ndarray, region: int) -> Scene:
+        """Only the points of a mask (n,), and the lines of one region's number."""
         kept = (self.points[mask], self.normals[mask], self.region[mask], self.radius[mask])
-        return Scene(*kept, self.lines)
+        return Scene(*kept, tuple(lines for lines in self.lines if lines.region == region))
 
 
 def render(
@@ -162,10 +162,12 @@ def _paint(
     pixels: float,
 ) -> None:
     """Draw lines (k, 3) into `image` before the depth `cover`, and a dot where they begin."""
-    drawn = [(line, _LINE) for line in lines if len(line)]
-    drawn += [(line[:1], _DOT) for line, _ in drawn[:1]]
-    for line, radius in drawn:
-        view = _resampled(line, 0.5 / pixels) @ axes.T
+    lines = [line for line in lines if len(line)]
+    if not lines:
+        return
+    fine = np.concatenate([_resampled(line, 0.5 / pixels) for line in lines])
+    for points, radius in ((fine, _LINE), (lines[0][:1], _DOT)):
+        view = points @ axes.T
         column, row = np.floor((view[:, :2] - corner) * pixels).astype(int).T
         reach = np.arange(-int(radius), int(radius) + 1)
         dx, dy = (grid.ravel() for grid in np.meshgrid(reach, reach))

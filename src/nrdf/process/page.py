@@ -16,7 +16,7 @@ from nrdf.ply import write_atomically
 from nrdf.process.report import FIGURES, figures
 from nrdf.units import in_words
 
-_DETAIL = 400  # pixels, drawn at half of it
+_DETAIL = 280  # pixels, shown smaller
 _STYLE = """
 :root { --ink: #1f2328; --soft: #656d76; --line: #d8dee4; --bad: #b42318; --good: #1a7f37; }
 * { box-sizing: border-box; }
