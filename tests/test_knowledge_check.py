@@ -16,7 +16,7 @@ def checked(reference=None, name="top", **changes):
 def test_a_good_process_is_planned_and_measured():
     row = checked()
     assert (row.region, row.fault, row.where) == ("top", "", "region 'top', sand")
-    assert row.measures.coverage > 0.95 and row.points > 300
+    assert row.measures.coverage > 0.95
 
 
 @pytest.mark.parametrize(

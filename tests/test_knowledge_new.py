@@ -71,6 +71,14 @@ def test_several_regions_in_one_file(files):
     assert read_knowledge(files / "k.json") == knowledge
 
 
+def test_regions_that_overlap_are_written_with_a_warning(files, caplog):
+    both = np.concatenate([faces(cloud())["top"], faces(cloud())["front"]])
+    write_cloud(files / "both.ply", cloud().select(both))
+    knowledge = new(files, "top", "both")
+    assert "regions 'top' and 'both' overlap" in caplog.text
+    assert not knowledge.allow_overlap  # the check refuses it until a person has decided
+
+
 def test_mistakes_are_explained(files):
     with pytest.raises(ProcessError, match="no process kind 'sandd'; known: sand, polish"):
         new(files, kinds=["sandd"])

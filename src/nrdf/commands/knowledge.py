@@ -98,7 +98,7 @@ def check(file: Positional[Path]) -> None:
     if reference.cloud and reference.sha256 is None:
         log.warning("reference.sha256 is not given: another cloud in its place goes unnoticed")
     _show_asked(checked)
-    _show_planned(checked)
+    _show_planned(checked, {name: len(of) for name, of in lesson.regions.items()})
     for row in checked:
         for warning in row.warnings:
             errors.print(f"{row.where}: {warning}", style="yellow")
@@ -151,14 +151,14 @@ def _show_asked(checked: list[Checked]) -> None:
     show(shown)
 
 
-def _show_planned(checked: list[Checked]) -> None:
+def _show_planned(checked: list[Checked], points: dict[str, int]) -> None:
     from nrdf.process.report import SHORT_FIGURES, short_figures
 
     shown = table("\nplanned on the reference", "region", "points", *SHORT_FIGURES)
     for row in checked:
         missing = row.measures is None
         cells = ["–"] * len(SHORT_FIGURES) if missing else short_figures(vars(row.measures))
-        shown.add_row(row.region, str(row.points), *cells)
+        shown.add_row(row.region, str(points[row.region]), *cells)
     show(shown)
 
 

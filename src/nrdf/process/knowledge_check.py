@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.geometry import estimate_normals
+from nrdf.geometry import estimate_normals, thin
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
@@ -17,6 +17,7 @@ from nrdf.process.report import measure_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.surface import Surface
 from nrdf.process.taught import normals_under, taught_lines
+from nrdf.regions.model import WORKING_POINTS
 from nrdf.units import in_words
 
 
@@ -26,7 +27,6 @@ class Checked:
     what to look at; measures: None where it cannot be done."""
 
     region: str
-    points: int
     process: Process
     fault: str = ""
     warnings: tuple[str, ...] = ()
@@ -40,13 +40,16 @@ class Checked:
 
 def check(lesson: Lesson, progress: Callable[[int, int], None] | None = None) -> list[Checked]:
     """Plan and measure every process on the reference; `progress` is told (done, all)."""
-    cloud = lesson.cloud
+    # The same points as a model would work with.
+    kept = thin(lesson.cloud.points, WORKING_POINTS, np.random.default_rng(0))
+    cloud = lesson.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
     surface = Surface(cloud.points, normals)
+    regions = {name: np.flatnonzero(np.isin(kept, of)) for name, of in lesson.regions.items()}
     steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.processes]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
-        checked.append(_checked(surface, name, lesson.regions[name], process))
+        checked.append(_checked(surface, name, regions[name], process))
         if progress is not None:
             progress(done, len(steps))
     return checked
@@ -72,6 +75,6 @@ def _checked(surface: Surface, name: str, region: np.ndarray, process: Process) 
             segments = drive(drawn, normals_under(surface, lines), strategy)
         measures = measure(surface, region, strategy, segments)
     except ProcessError as error:
-        return Checked(name, len(region), process, str(error), tuple(warnings))
+        return Checked(name, process, str(error), tuple(warnings))
     warnings += measure_warnings(process, measures)
-    return Checked(name, len(region), process, "", tuple(warnings), measures)
+    return Checked(name, process, "", tuple(warnings), measures)

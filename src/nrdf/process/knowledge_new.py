@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,9 +12,11 @@ from nrdf.cloud import check_cloud, read_cloud
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.knowledge import Kind, Knowledge
 from nrdf.process.knowledge_file import validated
-from nrdf.process.lesson import bind, checksum, known_unit
+from nrdf.process.lesson import bind, checksum, known_unit, overlaps
 from nrdf.regions.files import read_regions
 from nrdf.regions.model import MINIMUM_POINTS
+
+log = logging.getLogger(__name__)
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 PLACEHOLDER = "my-region"
@@ -62,9 +65,9 @@ def new_knowledge(
 ) -> Knowledge:
     """Knowledge to fill in, for a file in `folder`.
 
-    regions: region files; without them there is one placeholder, whose file has still to be
-    made. kinds: of the process on each region, or one for all. unit: of the reference, where its
-    file does not say.
+    regions: region files, warned about where they overlap; without them there is one placeholder,
+    whose file has still to be made. kinds: of the process on each region, or one for all. unit:
+    of the reference, where its file does not say.
 
     Raises ProcessError for an unknown kind, kinds that do not fit the regions and an unknown
     unit; RegionError and CloudError for files that cannot be read, or regions that are not on the
@@ -100,7 +103,9 @@ def new_knowledge(
     }
     knowledge = validated(content, "the new file")
     if regions:
-        bind(knowledge, folder, "the new file")
+        lesson = bind(knowledge.model_copy(update={"allow_overlap": True}), folder, "the new file")
+        for line in overlaps(lesson.regions):
+            log.warning("%s", line)
     return knowledge
 
 

@@ -9,7 +9,6 @@ A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any n
 
 from __future__ import annotations
 
-import logging
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,8 +28,6 @@ from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught import TaughtLine, taught_lines
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.regions.model import Embedded, Match, Model
-
-log = logging.getLogger(__name__)
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
