@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.process.border import OWN
-from nrdf.process.frames import lean_rotation, tool_quaternions, travel_of
+from nrdf.process.frames import lean_rotation, surface_frames, travel_of
 from nrdf.process.patch import Patch, patches_of
 from nrdf.process.plan import Strategy
-from nrdf.process.surface import Surface
+from nrdf.process.surface import Surface, unit
 from nrdf.process.toolpath import Segment
 
 _FACING = 0.2
@@ -68,19 +68,7 @@ def measure(
     inside = _inside(surface, region, patches, strategy.edge_margin_m)
     visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
     spacing = _line_spacing(patches, track, strategy.stepover_m)
-    everywhere = np.concatenate(contacts)
-    held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
-    upright = held * lean_rotation(strategy.lead_rad, strategy.tilt_rad).inv()
-    tails = -upright.as_matrix()[:, :, 2]
-    off = _off_surface(surface, everywhere, tails)
-    smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
-    cuts = np.cumsum([len(line) for line in contacts])[:-1]
-    wrong = np.concatenate(
-        [
-            _axis_error(line, normals, turned, strategy)
-            for line, normals, turned in zip(contacts, np.split(smooth, cuts), axes, strict=True)
-        ]
-    )
+    off, wrong = _fit(surface, strategy, work, contacts)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
     return Measures(
         coverage=float((visits > 0).mean()) if len(visits) else 0.0,
@@ -101,29 +89,39 @@ def _axes(segment: Segment) -> np.ndarray:
     return Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
 
 
-def _off_surface(surface: Surface, contacts: np.ndarray, tails: np.ndarray) -> np.ndarray:
-    """Distance (n,), m, of contacts (n, 3) from the smooth surface that faces the tool.
-
-    At an edge it has more than one sheet, each found from a normal of its own; the nearest counts.
-    """
-    near = surface.tree.query(contacts, min(4, len(surface.points)))[1]
-    off = np.full(len(contacts), np.inf)
-    for normals in (tails, *np.moveaxis(surface.normals[near], 1, 0)):
-        facing = np.einsum("na,na->n", normals, tails) > _FACING
-        found = surface.project(contacts[facing], normals[facing])[0]
-        off[facing] = np.minimum(off[facing], np.linalg.norm(found - contacts[facing], axis=1))
-    return off
-
-
-def _axis_error(
-    contacts: np.ndarray, normals: np.ndarray, axes: np.ndarray, strategy: Strategy
-) -> np.ndarray:
-    """Angle (n,), rad, between tool z and what the strategy asks for on smooth normals (n, 3)."""
-    # One waypoint has no travel; on a tool that does not lean it would not matter.
-    travel = travel_of(contacts, 0.5 * strategy.stepover_m) if len(contacts) > 1 else axes
-    asked = tool_quaternions(travel, normals, strategy.lead_rad, strategy.tilt_rad)
-    cosine = np.einsum("na,na->n", Rotation.from_quat(asked).as_matrix()[:, :, 2], axes)
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
+def _fit(
+    surface: Surface,
+    strategy: Strategy,
+    work: Sequence[Segment],
+    contacts: Sequence[np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of every waypoint, the distance (n,), m, from the smooth surface that faces the tool, and
+    the angle (n,), rad, between tool z and what the strategy asks for on smooth normals."""
+    everywhere = np.concatenate(contacts)
+    held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
+    lean = lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    tails = -(held * lean.inv()).as_matrix()[:, :, 2]
+    # At an edge there are several sheets, each found from a normal of its own; the nearest counts.
+    near = surface.normals[surface.tree.query(everywhere, min(8, len(surface.points)))[1]]
+    facing = np.einsum("nka,na->nk", near, tails) > _FACING
+    beneath = near[np.arange(len(near)), facing.argmax(axis=1)]
+    off = np.min(
+        [
+            np.linalg.norm(surface.project(everywhere, normals)[0] - everywhere, axis=1)
+            for normals in (tails, beneath)
+        ],
+        axis=0,
+    )
+    smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
+    asked = []
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    for line, normals in zip(contacts, np.split(smooth, cuts), strict=True):
+        # A waypoint alone has no travel; for a tool that does not lean, any will do.
+        travel = travel_of(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
+        asked.append(surface_frames(travel, normals))
+    axes = (Rotation.from_matrix(np.concatenate(asked)) * lean).as_matrix()[:, :, 2]
+    cosine = np.einsum("na,na->n", axes, held.as_matrix()[:, :, 2])
+    return off, np.arccos(np.clip(cosine, -1.0, 1.0))
 
 
 def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float, float]:
@@ -181,7 +179,8 @@ class _Track:
             travel.append(travel_of(fine) if len(line) > 1 else np.zeros_like(fine))
             walked.append(far + at)
             far += way[-1] + 1e3
-        return _Track(*map(np.concatenate, (places, turned, travel, walked)), step)
+        place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
+        return _Track(place, unit(axis), ahead, way, step)
 
     def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
         """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
@@ -204,9 +203,9 @@ def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> n
     """Distances (k,), m, along the surface, from places of lines to the next lines beside them.
 
     The nearest line to either side counts if the region goes on all the way to it, within one
-    patch. Places are compared in the patch's plane, and measured with its metric.
+    patch. Neighbours are found in the patch's plane, and measured in space.
     """
-    owner, point, uv = _located(patches, track)
+    owner, point, uv = locate(patches, track.places, -track.axes)
     found = [np.zeros(0)]
     for number, patch in enumerate(patches):
         mine = np.flatnonzero(owner == number)
@@ -231,29 +230,30 @@ def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> n
         for share in (0.25, 0.5, 0.75):
             whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
         i, j = i[whole], j[whole]
-        metric = 0.5 * (patch.metric[point[mine[i]]] + patch.metric[point[mine[j]]])
-        offset = place[j] - place[i]
-        found.append(np.sqrt(np.einsum("pa,pab,pb->p", offset, metric, offset)))
+        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
+        turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
+        half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
+        found.append(chord / np.sinc(half / np.pi))  # the arc over the chord
     return np.concatenate(found)
 
 
-def _located(patches: Sequence[Patch], track: _Track) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The patch (n,) that each place of a track is on, the patch's point (n,) nearest to it, and
-    its uv (n, 2) there."""
-    best = np.full(len(track.places), np.inf)
-    owner, point = np.full(len(best), -1), np.zeros(len(best), int)
+def locate(
+    patches: Sequence[Patch], places: np.ndarray, tails: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The patch (n,) that each of `places` (n, 3) is on, the patch's point (n,) nearest to it, and
+    its uv (n, 2) there; tails: (n, 3) tells the side, that of the tool."""
+    best = np.full(len(places), np.inf)
+    owner, point = np.zeros(len(best), int), np.zeros(len(best), int)
     uv = np.zeros((len(best), 2))
     for number, patch in enumerate(patches):
         own = np.flatnonzero(patch.label == OWN)
-        distance, near = cKDTree(patch.points[own]).query(track.places)
+        distance, near = cKDTree(patch.points[own]).query(places)
         near = own[near]
-        outward = np.cross(patch.tangents[near, 0], patch.tangents[near, 1])
-        # A place over the other side of a thin part is as good as far away.
-        distance += 1e3 * (np.einsum("na,na->n", outward, track.axes) > -_FACING)
-        offset = np.einsum("nba,na->nb", patch.tangents[near], track.places - patch.points[near])
+        # On a thin part the nearest patch is the one that faces the tool.
+        distance -= 3.0 * patch.spacing * np.einsum("na,na->n", patch.normals[near], tails)
+        offset = np.einsum("nba,na->nb", patch.tangents[near], places - patch.points[near])
         closer = distance < best
-        best = np.where(closer, distance, best)
-        owner = np.where(closer, number, owner)
+        best, owner = np.where(closer, distance, best), np.where(closer, number, owner)
         point = np.where(closer, near, point)
         uv = np.where(closer[:, None], patch.uv[near] + offset, uv)
     return owner, point, uv

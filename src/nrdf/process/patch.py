@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.process.border import CONTEXT, OTHER, OWN, Border
@@ -22,7 +22,10 @@ _FEWEST = 4  # points of a patch
 _BENT, _BENT_SHARE = 0.2, 0.03  # a patch with more of its points bent this much is cut in two
 _DEEPEST = 5  # cuts
 _SCRAP = 0.03  # smaller shares are not cut off
+_LEAST_STRETCH, _MOST_STRETCH = 0.7, 1.4
+_LEVEL = 0.85  # cosine between the normals of neighbours on one face
 _FITTED = 20
+_LONG = 1.2  # ratio of variances along and across from which a patch is longer than wide
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,11 @@ class Patch:
         return cKDTree(self.uv)
 
     @cached_property
+    def normals(self) -> np.ndarray:
+        """Outward unit normals (n, 3) of the points."""
+        return np.cross(self.tangents[:, 0], self.tangents[:, 1])
+
+    @cached_property
     def border(self) -> Border:
         return Border(self.uv, self.label, self.spacing)
 
@@ -61,11 +69,27 @@ class Patch:
         found = quadrics(offset, self.points[near] - origin[:, None], weight)
         return origin + found[:, 0], found[:, 1:3] / self.spacing
 
+    def smooth_normals(self, uv: np.ndarray, radius_m: float) -> np.ndarray:
+        """Outward normals (m, 3), averaged over the patch within `radius_m` of `uv` (m, 2).
+
+        What a flat tool of that radius feels; where the patch is narrower, that of all its width.
+        """
+        radius = max(radius_m, 2.0 * self.spacing)
+        count = int(np.clip(1.5 * np.pi * (radius / self.spacing) ** 2, 16, 256))
+        distance, near = self._tree.query(uv, min(count, len(self.uv)))
+        weight = np.maximum(1.0 - (distance / radius) ** 2, 1e-6) ** 2
+        return unit(np.einsum("mk,mka->ma", weight, self.normals[near]))
+
     @cached_property
     def metric(self) -> np.ndarray:
-        """Metric tensors (n, 2, 2) at the points: lengths on the surface by lengths in uv."""
+        """Metric tensors (n, 2, 2) at the points: lengths on the surface by lengths in uv.
+
+        What an unrolled patch stretches is within bounds; beyond, it is the points' noise.
+        """
         along = self.at(self.uv)[1]
-        return np.einsum("nia,nja->nij", along, along)
+        squared, axes = np.linalg.eigh(np.einsum("nia,nja->nij", along, along))
+        bounded = np.clip(squared, _LEAST_STRETCH**2, _MOST_STRETCH**2)
+        return np.einsum("nik,nk,njk->nij", axes, bounded, axes)
 
     def angle_of(self, direction: np.ndarray) -> tuple[float, float]:
         """Angle (rad) in the plane of a direction (3,), and its mean share [0, 1] that lies in
@@ -76,21 +100,24 @@ class Patch:
 
     @cached_property
     def extent(self) -> tuple[float, float, float]:
-        """Length and width (m) of the smallest rectangle around, and the angle of its length."""
-        own = self.uv[self.label == OWN]
-        try:
-            corners = own[ConvexHull(own).vertices]
-        except QhullError:  # all in one line
-            corners = own
-        side = np.roll(corners, -1, axis=0) - corners
-        angles = np.unique(np.arctan2(side[:, 1], side[:, 0]) % (np.pi / 2))
-        c, s = np.cos(angles), np.sin(angles)
-        length = np.ptp(np.outer(corners[:, 0], c) + np.outer(corners[:, 1], s), axis=0)
-        width = np.ptp(np.outer(corners[:, 1], c) - np.outer(corners[:, 0], s), axis=0)
-        best = int(np.argmin(length * width))
-        if length[best] >= width[best]:
-            return float(length[best]), float(width[best]), float(angles[best])
-        return float(width[best]), float(length[best]), float(angles[best] + np.pi / 2)
+        """Length and width (m) of the rectangle around, and the angle of the length.
+
+        Along the principal axis of the patch's area; where that is nearly round or square, along
+        the smallest rectangle.
+        """
+        grid = self.border.grid
+        area = grid.nodes[self.border.clearance(grid.nodes, 0.0) > 0.0]
+        area = area if len(area) else self.uv[self.label == OWN]
+        squared, axes = np.linalg.eigh(np.cov(area.T))
+        angles = np.radians(np.arange(90.0))
+        if squared[1] > _LONG * squared[0]:
+            angles = np.arctan2(axes[1:, 1], axes[:1, 1])
+        c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+        along = np.ptp(c * area[:, 0] + s * area[:, 1], axis=1)
+        across = np.ptp(c * area[:, 1] - s * area[:, 0], axis=1)
+        best = int(np.argmin(along * across))
+        length, width, angle = float(along[best]), float(across[best]), float(angles[best])
+        return (length, width, angle) if length >= width else (width, length, angle + np.pi / 2)
 
 
 def patches_of(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
@@ -178,13 +205,13 @@ def _edges_within(surface: Surface, chosen: np.ndarray) -> np.ndarray:
     return edges[(edges >= 0).all(axis=1)]
 
 
-def _surroundings(surface: Surface, own: np.ndarray, hops: int = 2) -> np.ndarray:
-    """Indices of `own` and of what is at most `hops` edges away."""
+def _surroundings(surface: Surface, own: np.ndarray, hops: int) -> np.ndarray:
+    """Indices of `own` and of what is at most `hops` edges away without a sharp turn."""
     inside = np.zeros(len(surface.points), bool)
     inside[own] = True
+    smooth = surface.edges[surface.turns > _LEVEL]
     for _ in range(hops):
-        touched = surface.edges[inside[surface.edges].any(axis=1)]
-        inside[touched] = True
+        inside[smooth[inside[smooth].any(axis=1)]] = True
     return np.flatnonzero(inside)
 
 

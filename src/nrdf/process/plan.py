@@ -157,7 +157,7 @@ def _held(
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
-    length, width = (max(patch.extent[k] + patch.spacing for patch in patches) for k in (0, 1))
+    length, width, _ = max((patch.extent for patch in patches), key=lambda extent: extent[0])
     if strategy.stepover_m > length:
         raise ProcessError(
             f"stepover_m is {strategy.stepover_m:g}, wider than the region, which measures "
@@ -210,17 +210,18 @@ def _lines(
         return []
     cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
     even = []
-    for stroke, places in zip(
-        strokes, np.split(patch.at(np.concatenate(strokes))[0], cuts), strict=True
-    ):
-        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    flat = patch.at(np.concatenate(strokes))[0]
+    for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
+        steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
         walked = np.concatenate([[0.0], np.cumsum(steps)])
         count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
         at = np.linspace(0.0, walked[-1], count + 1)
         even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
-    flat, along = patch.at(np.concatenate(even))
-    contacts, outward = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
-    normals = surface.smooth_normals(contacts, outward, strategy.tool_radius_m)
+    places = np.concatenate(even)
+    flat, along = patch.at(places)
+    contacts, _ = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
+    normals = patch.smooth_normals(places, strategy.tool_radius_m)
+    normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
     cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
     return [
         Line(*line) for line in zip(np.split(contacts, cuts), np.split(normals, cuts), strict=True)

@@ -99,6 +99,12 @@ class Surface:
         code = np.unique(pair[:, 0] * len(self.points) + pair[:, 1])
         return np.stack(np.divmod(code, len(self.points)), axis=1)
 
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """Cosine (e,) between the normals of each edge's ends."""
+        i, j = self.edges.T
+        return np.einsum("ea,ea->e", self.normals[i], self.normals[j])
+
     def project(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nearest places on the smooth surface, and its normals there, each (m, 3).
 
@@ -133,14 +139,14 @@ class Surface:
     ) -> np.ndarray:
         """Outward normals (m, 3), averaged over what faces a tool at points (m, 3).
 
-        That is the sheet within `radius_m` that faces the average itself, found from `normals`
-        (m, 3), which tell the side: what a flat tool of that radius feels.
+        That is the sheet within `radius_m` whose normals turn less than 60° from the average
+        itself, which is found from `normals` (m, 3): what a flat tool of that radius feels.
         """
         radius = max(radius_m, 2.0 * self.spacing)
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
         points, normals = np.asarray(points, dtype=np.float64), unit(normals)
         near = self._nearest_to(points, count)
-        for _ in range(6):
+        for _ in range(3):
             distance, facing = self._seen(points, normals, near)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
             mean = np.einsum("mk,mka->ma", weight, self.normals[near])
