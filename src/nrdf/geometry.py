@@ -161,6 +161,20 @@ def visibility(
     return vote, front, back
 
 
+def seen_from(
+    points: np.ndarray, normals: np.ndarray, views: np.ndarray, steepest: float = 0.17
+) -> np.ndarray:
+    """Which `points` (n, 3) of a surface are seen from each of the directions `views` (d, 3).
+
+    Returns (d, n) bool. A point must face the view, the cosine to its outward normal (`normals`
+    (n, 3)) being above `steepest`, and nothing may lie before it.
+    """
+    points, normals = points.astype(np.float32), normals.astype(np.float32)
+    spacing = _spacing(_nearest(points, min(9, len(points)))[0])
+    images = _depth_images(points, normals, views, spacing, 0.4)
+    return np.array([seen & (normals @ view > steepest) for view, seen in images])
+
+
 def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Distances and indices, each (n, count), of the nearest points, the point itself first."""
     distance, index = cKDTree(points).query(points, count)
