@@ -34,6 +34,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
+    from nrdf.commands.scan import scan
     from nrdf.commands.shapes import boxes, correspond, prepare, synth
     from nrdf.commands.show import demo
     from nrdf.commands.train import train
@@ -42,6 +43,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "retrieve": retrieve,
         "demo": demo,
         "info": info,
+        "scan": scan,
         "synth": synth,
         "prepare": prepare,
         "boxes": boxes,
