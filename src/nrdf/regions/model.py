@@ -151,7 +151,11 @@ class Model:
         points = (cloud.points[working] - centre) / scale
         seconds["normalise"] = time.perf_counter() - start
         start = time.perf_counter()
-        normals = estimate_normals(points) if cloud.normals is None else cloud.normals[working]
+        if cloud.normals is None:
+            sensors = None if cloud.sensors is None else (cloud.sensors - centre) / scale
+            normals = estimate_normals(points, sensors=sensors)
+        else:
+            normals = cloud.normals[working]
         seconds["normals"] = time.perf_counter() - start
         start = time.perf_counter()
         chosen = encoder_subset(points, self.field.config.encoder_points)

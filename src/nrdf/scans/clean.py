@@ -1,5 +1,4 @@
-"""From what a sensor delivers to the one object in it: every step is reported and can be left out.
-"""
+"""From what a sensor delivers to the one object in it: each step reports, and can be left out."""
 
 from __future__ import annotations
 

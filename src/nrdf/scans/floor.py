@@ -31,9 +31,7 @@ class Plane:
         return points @ self.normal - self.offset
 
 
-def find_floor(
-    points: np.ndarray, up: np.ndarray | None, rng: np.random.Generator
-) -> Plane | None:
+def find_floor(points: np.ndarray, up: np.ndarray | None, rng: np.random.Generator) -> Plane | None:
     """The plane under all of `points` (n, 3), if there is one that holds many of them (RANSAC).
 
     up: (3,) unit, or None to take planes of any direction. A plane is a floor if next to nothing
