@@ -12,10 +12,10 @@ from nrdf import cli
 from nrdf.cloud import read_cloud
 from nrdf.errors import CloudError, DataError
 from nrdf.ply import read_header, read_scalars
-from nrdf.scans.similarity import Similarity, about_up, up_axis, upright
 from nrdf.scans.simulate import ScanSettings, simulate_scan
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import tessellate
+from nrdf.similarity import Similarity, about_up, up_axis, upright
 
 BALL = trimesh.creation.icosphere(4, 0.5)
 POSE = Similarity(upright(up_axis("z")) @ about_up(0.7), np.array([5.0, -3.0, 1.0]), 100.0)

@@ -51,7 +51,7 @@ class DescriptorSearch:
             for name, region in regions.items()
         }
         every = np.concatenate(list(chosen.values()))
-        points = (reference.points[every] - on_reference.centre) / on_reference.scale
+        points = on_reference.canonical(reference.points[every])
         wanted = self._describe(on_reference, points)
         if self.energy:
             found = cKDTree(on_target.points).query(self._minimise(on_target, wanted))[1]

@@ -62,8 +62,8 @@ def scan(
     from nrdf.errors import DataError
     from nrdf.mesh import load_mesh
     from nrdf.output import write_json
-    from nrdf.scans.similarity import Similarity, about_up, up_axis, upright
     from nrdf.scans.simulate import ScanSettings, simulate_scan
+    from nrdf.similarity import Similarity, about_up, up_axis, upright
 
     if not scale > 0:
         raise DataError(f"--scale {scale:g} must be above 0")

@@ -21,6 +21,7 @@ from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
 from nrdf.regions.region import region_indices
+from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
 
 METHODS = ("mask", "points")
 WORKING_POINTS = 16384
@@ -37,22 +38,25 @@ class Embedded:
     """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
 
     cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
-    canonical. centre (3,), scale: canonical = (original - centre) / scale. z: (1, d_z).
-    seconds: time of each phase.
+    canonical. pose: from canonical coordinates to the cloud's. z: (1, d_z). seconds: time of each
+    phase.
     """
 
     cloud: PointCloud
     working: np.ndarray
     points: np.ndarray
     normals: np.ndarray
-    centre: np.ndarray
-    scale: float
+    pose: Similarity
     z: torch.Tensor
     seconds: dict[str, float] = field(default_factory=dict)
 
     def original(self, points_canonical: np.ndarray) -> np.ndarray:
         """Canonical points (m, 3) in the cloud's own frame and unit."""
-        return np.asarray(points_canonical, np.float64) * self.scale + self.centre
+        return self.pose.to_scan(np.asarray(points_canonical, np.float64))
+
+    def canonical(self, points: np.ndarray) -> np.ndarray:
+        """Points (m, 3) of the cloud's own frame and unit in canonical coordinates."""
+        return self.pose.to_canonical(points)
 
     def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Selected working points as indices of the whole cloud, and which working point each
@@ -71,8 +75,7 @@ class Embedded:
         """The position in `working` of the point nearest to each point of the cloud."""
         if self.is_whole:
             return self.working
-        points = (self.cloud.points - self.centre) / self.scale
-        return cKDTree(self.points).query(points)[1]
+        return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -137,32 +140,43 @@ class Model:
     def __repr__(self) -> str:
         return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"
 
-    def embed(self, cloud: PointCloud) -> Embedded:
+    def embed(
+        self, cloud: PointCloud, pose: Similarity | None = None, mirrored: bool = False
+    ) -> Embedded:
         """Thin, orient, normalise and embed a cloud in the category's canonical frame.
 
         Any unit, centre and scale will do. Normals are used as they are, or estimated where there
-        are none. Raises CloudError for a cloud that is empty, flat, or has too few points.
+        are none. Without `pose` (from canonical coordinates to the cloud's) the cloud is in the
+        canonical orientation and its bounding box gives the rest. With `mirrored` the field sees
+        the cloud's mirror image beside it, left for right: an object that was seen in part from one
+        side is embedded more like a whole one. Raises CloudError for a cloud that is empty, flat,
+        or has too few points.
         """
         check_cloud(cloud, MINIMUM_POINTS)
         seconds: dict[str, float] = {}
         start = time.perf_counter()
-        centre, scale = canonical_transform(cloud.points)
+        if pose is None:
+            pose = Similarity(np.eye(3), *canonical_transform(cloud.points))
         working = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
-        points = (cloud.points[working] - centre) / scale
+        points = pose.to_canonical(cloud.points[working])
         seconds["normalise"] = time.perf_counter() - start
         start = time.perf_counter()
         if cloud.normals is None:
-            sensors = None if cloud.sensors is None else (cloud.sensors - centre) / scale
+            sensors = None if cloud.sensors is None else pose.to_canonical(cloud.sensors)
             normals = estimate_normals(points, sensors=sensors)
         else:
-            normals = cloud.normals[working]
+            normals = cloud.normals[working] @ pose.rotation
         seconds["normals"] = time.perf_counter() - start
         start = time.perf_counter()
-        chosen = encoder_subset(points, self.field.config.encoder_points)
+        seen, lines = points, normals
+        if mirrored:
+            seen = np.concatenate([points, points * LEFT_FOR_RIGHT])
+            lines = np.concatenate([normals, normals * LEFT_FOR_RIGHT])
+        chosen = encoder_subset(seen, self.field.config.encoder_points)
         with torch.inference_mode():
-            z = self.field.embed(self._tensor(points[chosen]), self._tensor(normals[chosen]))
+            z = self.field.embed(self.tensor(seen[chosen])[None], self.tensor(lines[chosen])[None])
         seconds["embed"] = time.perf_counter() - start
-        return Embedded(cloud, working, points, normals, centre, scale, z, seconds)
+        return Embedded(cloud, working, points, normals, pose, z, seconds)
 
     def set_reference(self, reference: PointCloud) -> Taught:
         """Embed a reference and describe its surface once, for any number of targets.
@@ -171,8 +185,9 @@ class Model:
         """
         return Taught(self, self.embed(reference))
 
-    def _tensor(self, values: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(values, dtype=torch.float32, device=self.device)[None]
+    def tensor(self, values: np.ndarray) -> torch.Tensor:
+        """Values of any shape on the model's device, in single precision."""
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device)
 
 
 class Taught:
@@ -223,10 +238,10 @@ class Taught:
         reference = self.reference
         if reference.is_whole:
             return self._invert(target, self._k[:, indices], reference.normals[indices])
-        points = (reference.cloud.points[indices] - reference.centre) / reference.scale
+        points = reference.canonical(reference.cloud.points[indices])
         given = reference.cloud.normals
         normals = (
-            given[indices]
+            given[indices] @ reference.pose.rotation
             if given is not None
             else reference.normals[reference.nearest_working[indices]]
         )
@@ -294,7 +309,9 @@ class Taught:
                 part = slice(start, start + _CHUNK)
                 parts.append(
                     model.field.describe(
-                        self.reference.z, model._tensor(points[part]), model._tensor(normals[part])
+                        self.reference.z,
+                        model.tensor(points[part])[None],
+                        model.tensor(normals[part])[None],
                     )
                 )
         return torch.cat(parts, dim=1)

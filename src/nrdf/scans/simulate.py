@@ -10,7 +10,7 @@ import numpy as np
 from nrdf.cloud import PointCloud
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
-from nrdf.scans.similarity import Similarity
+from nrdf.similarity import Similarity
 
 _FLOOR_SIZE = 1.5  # half the side of the floor that is seen, in longest sides of the object
 

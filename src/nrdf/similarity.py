@@ -8,6 +8,8 @@ import numpy as np
 
 from nrdf.errors import CloudError
 
+LEFT_FOR_RIGHT = np.array([1.0, 1.0, -1.0])
+"""Canonical coordinates times this are those of the mirror image."""
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 
 
