@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,7 +19,15 @@ from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.association import (
+    NORMAL_WEIGHT,
+    VOTERS,
+    oriented_features,
+    snap,
+    voters,
+)
+from nrdf.regions.match import Mapped, Match, mapped_points
+from nrdf.regions.presence import find_presence
 from nrdf.regions.region import region_indices
 from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
 
@@ -30,7 +38,6 @@ MINIMUM_POINTS = 256
 _CHUNK = 8192  # points described or inverted at a time
 # Chosen on unseen family chairs, so that confidence is about the share of points that are right.
 _DISTANCE_SCALE = 0.4  # canonical distance to the mapped point at which trust has fallen to 1/e
-_ERROR_SCALE = 0.2  # the same, of the error that the field expects of itself
 
 
 @dataclass(frozen=True)
@@ -77,41 +84,19 @@ class Embedded:
             return self.working
         return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
 
+    def distance(self, mapped: Mapped) -> np.ndarray:
+        """Distance (m,) of mapped points from the working points, in position and normal."""
+        features = oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
+        return self._oriented_tree.query(features)[0]
+
+    @cached_property
+    def _oriented_tree(self) -> cKDTree:
+        return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))
+
     @cached_property
     def tree(self) -> cKDTree:
         """The cloud's own points, for regions that are given as points."""
         return cKDTree(self.cloud.points)
-
-
-@dataclass(frozen=True)
-class Match:
-    """A region found on a target.
-
-    indices: (k,) the target's own points in the region, ascending.
-    points: (m, 3) where C puts each point of the reference's region, in its order, in the
-        target's frame and unit (raw prediction, off the surface by the field's error).
-    confidence: (k,) in [0, 1], for each of `indices`.
-    method: "mask" or "points".
-    """
-
-    indices: np.ndarray
-    points: np.ndarray
-    confidence: np.ndarray
-    method: str
-
-    @property
-    def score(self) -> float:
-        """Mean confidence of the region's points; 0 for an empty region."""
-        return float(self.confidence.mean()) if len(self.confidence) else 0.0
-
-
-class Mapped(NamedTuple):
-    """Reference points on a target, canonical: points (m, 3), normals (m, 3), trust (m,) in [0, 1]
-    (that the place exists, and how small an error the field expects)."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    trust: np.ndarray
 
 
 class Model:
@@ -225,9 +210,21 @@ class Taught:
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self.model.embed(target)
+        start = time.perf_counter()
+        mapped = self.map_surface(embedded)
+        embedded.seconds["map"] = time.perf_counter() - start
+        start = time.perf_counter()
         if method == "mask":
-            return self._by_mask(chosen, embedded)
-        return {name: self._by_points(indices, embedded) for name, indices in chosen.items()}
+            matches = self._by_mask(chosen, mapped, embedded)
+        else:
+            matches = {name: self._by_points(i, mapped, embedded) for name, i in chosen.items()}
+        usual = float(np.median(mapped.error))
+        for name, indices in chosen.items():
+            region = mapped.select(self._working_mask(indices))
+            presence = find_presence(region.exists, region.error, usual, embedded.distance(region))
+            matches[name] = matches[name].with_presence(presence)
+        embedded.seconds["associate"] = time.perf_counter() - start
+        return matches
 
     def map_surface(self, target: Embedded) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
@@ -247,11 +244,9 @@ class Taught:
         )
         return self._invert(target, self._describe(points, normals), normals)
 
-    def _by_mask(self, chosen: dict[str, np.ndarray], target: Embedded) -> dict[str, Match]:
-        start = time.perf_counter()
-        mapped = self.map_surface(target)
-        target.seconds["map"] = time.perf_counter() - start
-        start = time.perf_counter()
+    def _by_mask(
+        self, chosen: dict[str, np.ndarray], mapped: Mapped, target: Embedded
+    ) -> dict[str, Match]:
         asked, distance = voters(
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
@@ -270,18 +265,14 @@ class Taught:
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
-        target.seconds["associate"] = time.perf_counter() - start
         return matches
 
-    def _by_points(self, indices: np.ndarray, target: Embedded) -> Match:
-        start = time.perf_counter()
-        mapped = self.map_points(indices, target)
-        target.seconds["map"] = time.perf_counter() - start
-        start = time.perf_counter()
+    def _by_points(self, indices: np.ndarray, mapped: Mapped, target: Embedded) -> Match:
+        whole = self.reference.is_whole
+        mapped = mapped.select(indices) if whole else self.map_points(indices, target)
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(nearest, return_index=True)
         trust = mapped.trust * np.exp(-distance / _DISTANCE_SCALE)
-        target.seconds["associate"] = time.perf_counter() - start
         return Match(
             indices=target.working[found],
             points=target.original(mapped.points),
@@ -321,26 +312,8 @@ class Taught:
         with torch.inference_mode():
             for start in range(0, k.shape[1], _CHUNK):
                 inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
-                own = normals[start : start + _CHUNK]
-                parts.append(
-                    Mapped(
-                        inverse.points[0].cpu().numpy(),
-                        own if inverse.normals is None else inverse.normals[0].cpu().numpy(),
-                        _trust(inverse.existence, inverse.log_error, len(own)),
-                    )
-                )
+                parts.append(mapped_points(inverse, normals[start : start + _CHUNK]))
         return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _trust(
-    existence: torch.Tensor | None, log_error: torch.Tensor | None, count: int
-) -> np.ndarray:
-    trust = torch.ones(count)
-    if existence is not None:
-        trust = trust * existence[0].sigmoid().cpu()
-    if log_error is not None:
-        trust = trust * torch.exp(-log_error[0].exp().cpu() / _ERROR_SCALE)
-    return trust.numpy()
 
 
 def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:

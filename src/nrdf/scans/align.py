@@ -176,12 +176,11 @@ def _completed(
     points: np.ndarray, normals: np.ndarray, hypotheses: list[_Hypothesis]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Posed points and normals (h, n, 3), every second one reflected where there is a plane."""
-    points, normals = points.copy(), normals.copy()
+    points, normals, half = points.copy(), normals.copy(), points.shape[1] // 2
     for index, found in enumerate(hypotheses):
         if found.plane is not None:
-            half = points.shape[1] // 2
-            points[index, half:] = points[index, :half] * LEFT_FOR_RIGHT
-            normals[index, half:] = normals[index, :half] * LEFT_FOR_RIGHT
+            points[index, 1::2] = points[index, ::2][:half] * LEFT_FOR_RIGHT
+            normals[index, 1::2] = normals[index, ::2][:half] * LEFT_FOR_RIGHT
     return points, normals
 
 
