@@ -21,7 +21,8 @@ NOTES = """
 Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
 Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
-message that says what to do; 130 after Ctrl-C."""
+message that says what to do; 3 where a limit that was set is not met (--strict);
+130 after Ctrl-C."""
 
 RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc", "ablate")
 GROUPS = ("eval",)
@@ -31,6 +32,7 @@ GROUPS = ("eval",)
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
     from nrdf.commands.ablate import ablate
+    from nrdf.commands.align import align
     from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.information import info, zoo
     from nrdf.commands.retrieve import retrieve
@@ -41,6 +43,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
 
     return {
         "retrieve": retrieve,
+        "align": align,
         "demo": demo,
         "info": info,
         "scan": scan,

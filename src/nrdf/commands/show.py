@@ -6,7 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nrdf.commands.console import command_line, console, provenance, show, table, versions
+from nrdf.commands.console import (
+    command_line,
+    console,
+    provenance,
+    show,
+    table,
+    versions,
+    write_report,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -70,7 +78,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
 
     import nrdf
     from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-    from nrdf.commands.retrieve import region_panel, write_matches, write_report
+    from nrdf.commands.retrieve import region_panel, write_matches
     from nrdf.picture import draw_regions
 
     loaded = nrdf.load_model(model, device)

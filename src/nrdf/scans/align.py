@@ -7,7 +7,7 @@ object's own mirror plane (`nrdf.scans.mirror`) and judged again, front and back
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,9 @@ _REFINED = 4  # of them that are refined
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
+_COST_SCALE = 0.02  # difference of cost that makes a pose e times less likely
+SURE = 0.8
+"""Probability of a pose against any other one alone, below which both are likely."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,8 @@ class Candidate:
 
     pose: from canonical coordinates to the scan's. up: (3,) in the scan. yaw: (rad) about it.
     cost: how badly the field explains the scan in this pose. symmetry: share of the points that
-    have a counterpart across the mirror plane, 0 where none was found.
+    have a counterpart across the mirror plane, 0 where none was found. probability: of this pose
+    among the candidates, which add up to 1.
     """
 
     pose: Similarity
@@ -41,6 +45,7 @@ class Candidate:
     yaw: float
     cost: float
     symmetry: float
+    probability: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,9 +56,20 @@ class Alignment:
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
-    def pose(self) -> Similarity:
-        """The likeliest pose."""
-        return self.candidates[0].pose
+    def best(self) -> Candidate:
+        """The likeliest candidate."""
+        return self.candidates[0]
+
+    @property
+    def likely(self) -> tuple[Candidate, ...]:
+        """The candidates that explain the scan about as well as the best one, which is first."""
+        least = (1 - SURE) / SURE * self.best.probability
+        return tuple(c for c in self.candidates if c.probability >= least)
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether there is more than one likely pose."""
+        return len(self.likely) > 1
 
 
 @dataclass(frozen=True)
@@ -132,7 +148,9 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
             yaw = float(np.arctan2(np.sin(found.yaw), np.cos(found.yaw)))
             candidates.append(Candidate(pose, found.up, yaw, float(costs[index]), symmetry))
     lap("fine")
-    return Alignment(tuple(candidates), seconds)
+    weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / _COST_SCALE)
+    weighed = zip(candidates, weights / weights.sum(), strict=True)
+    return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
 
 
 def _prepare(scan: PointCloud) -> _Working:

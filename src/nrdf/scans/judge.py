@@ -58,6 +58,10 @@ class Judge:
                 described.append(model.field.describe(embedded.z, points, normals))
         self._k = torch.cat(described)  # (p, _FINE_POINTS, d_k)
 
+    @property
+    def usual_cost(self) -> float:
+        return 0.0
+
     def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Cost (h,) of h hypotheses: clouds (h, n, 3) in hypothesised canonical frames.
 

@@ -14,6 +14,7 @@ from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
 from nrdf.scans.units import Unit, find_unit
 
+_FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
 _MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
 
 
@@ -29,12 +30,17 @@ class AlignedScan:
 
     def embed(self) -> Embedded:
         """The object as the model's field sees it, in the likeliest pose."""
-        best = self.alignment.candidates[0]
+        best = self.alignment.best
         return self.judge.model.embed(self.cleaned.cloud, best.pose, best.symmetry > _MIRRORED)
 
     def in_scan(self, match: Match) -> Match:
         """A match on the object, its indices those of the scan's points."""
         return replace(match, indices=self.cleaned.kept[match.indices])
+
+    @property
+    def fits(self) -> bool:
+        """Whether the object looks like one of the category at all."""
+        return self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
 
     @property
     def doubts(self) -> list[str]:
@@ -46,10 +52,10 @@ class AlignedScan:
                 "was taken: crop the scan to take another"
             )
         category = self.judge.model.category
-        if not self.alignment.fits:
+        if not self.fits:
             found.append(
                 f"the scan does not look like a {category}: the field explains it at a cost of "
-                f"{self.alignment.candidates[0].cost:.2f}, {self.judge.usual_cost:.2f} is usual"
+                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual"
             )
         if self.alignment.is_ambiguous:
             degrees = [f"{np.degrees(c.yaw):.0f}°" for c in self.alignment.likely]
@@ -85,7 +91,7 @@ def bring_in(
     if up is None and cleaned.floor is not None:
         up = cleaned.floor.normal
     alignment = align_scan(judge, cleaned.cloud, up)
-    longest = alignment.pose.scale
+    longest = alignment.best.pose.scale
     return AlignedScan(
         judge, scan, cleaned, alignment, find_unit(scan.unit, longest, judge.model.category)
     )
