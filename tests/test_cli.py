@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from nrdf import cli
-from nrdf.bundled import bundled_chair
+from nrdf.bundled import TARGETS, bundled_chair
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.ply import read_header, read_scalars
+from nrdf.process.lesson import read_lesson
 
 VERBS = sorted(cli.verbs())
 
@@ -217,19 +218,27 @@ def test_unexpected_errors_keep_their_traceback(retrieve, tmp_path, monkeypatch)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_demo_compares_with_the_truth(untrained, tmp_path):
+def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path):
     out = tmp_path / "demo"
     assert cli.run(["demo", "--model", str(untrained), "--out", str(out)]) == 0
     report = json.loads((out / "report.json").read_text())
+    assert {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()} == set(report["files"])
     rows = report["found"]
     assert len(rows) == 15
     for row in rows:
         _, truth = bundled_chair(row["chair"])
-        found = read_cloud(out / row["chair"] / f"{row['region']}.ply") if row["found"] else ()
-        assert (len(found), int(truth[row["region"]].sum())) == (row["found"], row["true"])
+        assert row["true"] == int(truth[row["region"]].sum())
         assert 0 <= row["iou"] <= 1
+        if row["coverage"] is not None:
+            found = read_cloud(out / row["chair"] / "regions" / f"{row['region']}.ply")
+            assert len(found) == row["found"]
+            assert 0.5 < row["coverage"] <= 1 and row["cycle_time_s"] > 0
     assert max(row["iou"] for row in rows) > 0.3
+    assert sum(row["coverage"] is not None for row in rows) >= 9
     assert (out / "picture.png").stat().st_size > 50_000
+    for chair in TARGETS:
+        assert (out / chair / "report.html").exists()
+        assert list((out / chair / "export" / "urscript").iterdir())
     # What the demo suggests to try next works.
     result = tmp_path / "result"
     words = f"retrieve --model {untrained} --reference {out}/reference.ply --region "
@@ -238,6 +247,9 @@ def test_demo_compares_with_the_truth(untrained, tmp_path):
     seat = next(row for row in rows if (row["chair"], row["region"]) == ("rocker", "seat"))
     again = json.loads((result / "report.json").read_text())["regions"]["seat"]
     assert again["points"] == seat["found"]
+    taught, _ = bundled_chair("reference")
+    lesson = read_lesson(out / "chair.yaml")
+    np.testing.assert_allclose(lesson.cloud.points, taught.points, atol=1e-6)
 
 
 def test_info_as_json(capsys):
@@ -317,15 +329,16 @@ def test_synth_and_correspond_pass_on_what_is_asked(tmp_path, monkeypatch, capsy
         progress(count, count)
         return 2
 
-    def correspond_folders(folders, templates, workers, progress):
-        asked.append((folders, templates))
+    def correspond_folders(folders, templates, workers, settings, progress, templates_from):
+        asked.append((folders, templates, templates_from))
         return CorrespondReport(["a", "b"], 5, 1)
 
     monkeypatch.setattr("nrdf.shapes.synth.synthesise", synthesise)
     monkeypatch.setattr("nrdf.shapes.correspond.correspond_folders", correspond_folders)
     assert cli.run(f"synth car --count 7 --seed 3 --out {tmp_path}".split()) == 0
-    assert cli.run(f"correspond {tmp_path} other --templates 2".split()) == 0
-    assert asked == [("car", 7, tmp_path, 3), ([tmp_path, Path("other")], 2)]
+    words = f"correspond {tmp_path} other --templates 2 --templates-from other"
+    assert cli.run(words.split()) == 0
+    assert asked == [("car", 7, tmp_path, 3), ([tmp_path, Path("other")], 2, Path("other"))]
     said = capsys.readouterr().out
     assert "2 shapes made, 5 were there already" in said
     assert "5 shapes registered, 1 were before; templates: a, b" in said

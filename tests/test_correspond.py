@@ -108,6 +108,16 @@ def test_folders_are_taken_together(folder, tmp_path):
     assert any(name.startswith("round") for name in report.templates)
 
 
+def test_templates_may_come_from_one_folder_only(folder, tmp_path):
+    other = tmp_path / "others"
+    other.mkdir()
+    write_folder(other, [Ball(f"other-{i}") for i in range(2)], 0)
+    report = correspond_folders([folder, other], 2, 1, SETTINGS, templates_from=other)
+    assert set(report.templates) == {"other-0", "other-1"} and report.done == 8
+    with pytest.raises(DataError, match=r"3 templates cannot be chosen out of the 2 .*others"):
+        correspond_folders([folder, other], 3, 1, SETTINGS, templates_from=other)
+
+
 @pytest.mark.parametrize("templates", [0, 5])
 def test_more_templates_than_training_shapes_are_refused(folder, templates):
     with pytest.raises(DataError, match=f"{templates} templates .* the 4 training shapes in .*"):

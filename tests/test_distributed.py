@@ -34,8 +34,8 @@ def test_precision_is_what_is_asked_for(monkeypatch):
     cpu = torch.device("cpu")
     assert choose_precision("bfloat16", cpu) == torch.bfloat16
     assert choose_precision("float32", cpu) == torch.float32
-    for amx, expected in ((True, torch.bfloat16), (False, torch.float32)):
-        monkeypatch.setattr("nrdf.training.distributed.cpu_has_amx", lambda amx=amx: amx)
+    for fast, expected in ((True, torch.bfloat16), (False, torch.float32)):
+        monkeypatch.setattr("nrdf.training.distributed.cpu_has_bfloat16", lambda fast=fast: fast)
         assert choose_precision("auto", cpu) == expected
 
 

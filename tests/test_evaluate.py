@@ -8,7 +8,7 @@ import pytest
 from bsrc_folder import member_clouds, write_bsrc
 from nrdf.benchmark import evaluate as module
 from nrdf.benchmark.bsrc import ROIS, read_bsrc
-from nrdf.benchmark.evaluate import evaluate, run_pair
+from nrdf.benchmark.evaluate import MethodResult, evaluate, run_pair
 from nrdf.benchmark.methods import MethodSpec, build_method
 from nrdf.benchmark.metrics import METRICS, chamfer_l1
 from nrdf.benchmark.store import PairStore
@@ -70,6 +70,30 @@ def test_a_region_found_nowhere_is_counted_as_missed(benchmark):
     assert [roi for roi, count in result.points.items() if not count] == ["3"]
     assert result.figures["3"]["cd-l1"] == 1.0 > result.figures["1"]["cd-l1"]
     assert set(result.figures["3"]) == set(METRICS)
+
+
+def test_confidence_divides_the_regions_into_sure_and_unsure(benchmark, copy):
+    assert copy.by_confidence() is None
+
+    class Sure:
+        """Finds every region by copying; the surer, the less it misses (it knows the truth)."""
+
+        def __init__(self):
+            self.confidence = {}
+
+        def __call__(self, reference, regions, target):
+            found = build_method(COPY)(reference, regions, target)
+            truth = next(item for item in benchmark.objects if item.cloud is target).regions
+            self.confidence = {
+                roi: -chamfer_l1(target.points[found[roi]], truth[roi]) for roi in regions
+            }
+            return found
+
+    pairs = tuple(run_pair(Sure(), "chair", *pair) for pair in benchmark.pairs)
+    sure, unsure = MethodResult(COPY, copy.rois, pairs).by_confidence()
+    ordered = np.sort(copy.values("cd-l1"), axis=None)
+    assert sure == pytest.approx(ordered[:12].mean()) and len(ordered) == 48
+    assert unsure == pytest.approx(ordered[-12:].mean())
 
 
 def test_several_processes_find_the_same(benchmark, copy):

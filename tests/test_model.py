@@ -9,8 +9,9 @@ import torch
 from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError, RegionError
 from nrdf.field import build_field
-from nrdf.regions.match import ERROR_SCALE
-from nrdf.regions.model import WORKING_POINTS, Model, encoder_subset
+from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.match import TRUST_SCALE
+from nrdf.regions.model import WORKING_POINTS, Model
 from nrdf.shapes.families import get_family
 from solids import box
 
@@ -35,6 +36,14 @@ OFFSET = np.array([200.0, -4000.0, 50.0])
 def build(**sizes) -> Model:
     torch.manual_seed(0)
     return Model(build_field("default", {**SMALL, **sizes}), {"category": "chair"})
+
+
+def build_doubtful() -> Model:
+    """Untrained, it is far off on other chairs; this one knows it."""
+    model = build()
+    with torch.no_grad():
+        model.field.inverse.leave.bias[7] = 1.0  # log error
+    return model
 
 
 def chair(seed: int = 0, count: int = COUNT, draw: int = 0):
@@ -94,7 +103,7 @@ def test_on_the_reference_itself_regions_are_found_again(taught, reference, meth
         assert overlap(match.indices, masks[name]) > (0.9 if method == "mask" else 0.999)
         np.testing.assert_allclose(match.points, cloud.points[masks[name]], atol=1e-5)
         # existence starts at 3, log error at -3, and the field is right about neither
-        start = 0.9526 * np.exp(-np.exp(-3) / ERROR_SCALE)
+        start = 0.9526 * np.exp(-np.exp(-3) / TRUST_SCALE)
         assert start * 0.75 < match.score <= start + 1e-3
 
 
@@ -128,7 +137,8 @@ def test_a_reference_may_have_any_scale_too(model, reference):
 
 
 @pytest.mark.parametrize("method", ["mask", "points"])
-def test_another_chair_is_searched(taught, reference, method):
+def test_another_chair_is_searched(reference, method):
+    taught = build_doubtful().set_reference(reference[0])
     target, truth = chair(seed=5)
     matches = taught.retrieve_all(reference[1], target, method)
     for match in matches.values():
@@ -223,6 +233,7 @@ def test_the_order_of_points_does_not_matter(reference):
     with torch.no_grad():
         for parameter in model.field.parameters():
             parameter.add_(0.03 * torch.randn_like(parameter))
+        model.field.inverse.leave.bias[7] = 1.0  # log error: it knows that it is far off
     cloud, masks = reference
     target, _ = chair(seed=5)
     first = model.set_reference(cloud).retrieve(masks["seat"], target)
@@ -250,6 +261,22 @@ def test_a_field_that_doubts_lowers_the_confidence(reference):
     absent = model.set_reference(cloud).retrieve(masks["seat"], cloud)
     assert sure.score > 1.3 * unsure.score > 0 and absent.score < 1e-4
     np.testing.assert_array_equal(sure.indices, unsure.indices)
+
+
+def test_a_part_that_the_reference_lacks_is_in_no_region(taught, reference):
+    cloud, masks = reference
+    # A shelf above the seat, a fifth of the chair's height away from everything.
+    seat = cloud.points[masks["seat"]]
+    shelf = seat[seat[:, 1] > np.median(seat[:, 1])] * [0.3, 1.0, 0.3] + [0.0, 0.2, 0.0]
+    normals = np.tile([0.0, 1.0, 0.0], (len(shelf), 1))
+    target = PointCloud(
+        np.concatenate([cloud.points, shelf]), np.concatenate([cloud.normals, normals])
+    )
+    match = taught.retrieve(masks["seat"], target)
+    assert overlap(match.indices[match.indices < COUNT], masks["seat"]) > 0.9
+    assert not (match.indices >= COUNT).any()
+    alone = taught.retrieve(masks["seat"], cloud)
+    assert match.score < 0.95 * alone.score  # much around it is not explained
 
 
 def test_the_encoder_sees_the_extreme_points():

@@ -3,15 +3,20 @@
     python tools/bundle_chairs.py
 
 Writes src/nrdf/bundled/<name>.npz: points (8192, 3) float32 in metres, without normals, as a
-sensor would give them; region (8192,) uint8, the index into `regions` (name 0 is "none").
+sensor would give them; region (8192,) uint8, the index into `regions` (name 0 is "none"). And the
+regions of the reference, which the demo's process knowledge names: a mask (8192,) for each; and
+its checksum into that knowledge, chair.yaml.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
+from nrdf.bundled import KNOWLEDGE, REFERENCE, REGIONS_FILE, bundled_chair
+from nrdf.process.lesson import checksum
 from nrdf.shapes.families import get_family
 
 BUNDLED = Path(__file__).resolve().parents[1] / "src" / "nrdf" / "bundled"
@@ -32,7 +37,10 @@ def main() -> None:
         named = family.region_of(surface.coordinates)
         region = np.zeros(POINTS, np.uint8)
         for i, wanted in enumerate(REGIONS[1:], 1):
-            region[np.char.startswith(named, GROUPS.get(wanted, wanted))] = i
+            inside = (
+                np.char.startswith(named, GROUPS[wanted]) if wanted in GROUPS else named == wanted
+            )
+            region[inside] = i
         # Standing on the floor.
         points = HEIGHT * (surface.points - [0.0, surface.points[:, 1].min(), 0.0])
         np.savez_compressed(
@@ -41,6 +49,10 @@ def main() -> None:
             region=region,
             regions=np.array(REGIONS),
         )
+    _, masks = bundled_chair(REFERENCE)
+    np.savez_compressed(BUNDLED / REGIONS_FILE, **masks)
+    line = f"sha256: {checksum(BUNDLED / f'{REFERENCE}.npz')}"
+    KNOWLEDGE.write_text(re.sub("sha256: .*", line, KNOWLEDGE.read_text()))
 
 
 if __name__ == "__main__":

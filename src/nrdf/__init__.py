@@ -4,6 +4,9 @@
     taught = model.set_reference(nrdf.read_cloud("reference.ply"))
     match = taught.retrieve(region, nrdf.read_cloud("target.ply"))
 
+    teacher = nrdf.teach("chair.yaml")  # process knowledge: regions, and what is done on them
+    job = teacher.transfer(nrdf.read_cloud("target.ply"))
+
 Everything is imported when it is first used, so `import nrdf` is cheap.
 """
 
@@ -20,30 +23,41 @@ if TYPE_CHECKING:
         CloudError,
         ConfigError,
         DataError,
+        LimitError,
         ModelError,
         NrdfError,
         OutputError,
+        ProcessError,
         RegionError,
         TrainingError,
     )
-    from nrdf.regions.model import Match, Model, Taught
+    from nrdf.process.knowledge import Knowledge
+    from nrdf.process.transfer import Teacher, Transferred
+    from nrdf.regions.match import Match
+    from nrdf.regions.model import Model, Taught
 
 __all__ = [
     "CloudError",
     "ConfigError",
     "DataError",
+    "Knowledge",
+    "LimitError",
     "Match",
     "Model",
     "ModelError",
     "NrdfError",
     "OutputError",
     "PointCloud",
+    "ProcessError",
     "RegionError",
     "Taught",
+    "Teacher",
     "TrainingError",
+    "Transferred",
     "__version__",
     "load_model",
     "read_cloud",
+    "teach",
     "write_cloud",
 ]
 
@@ -52,6 +66,8 @@ __version__ = "0.1.0"
 _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
     **dict.fromkeys(("Match", "Model", "Taught"), "nrdf.regions.model"),
+    **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
+    "Knowledge": "nrdf.process.knowledge",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
 
@@ -69,6 +85,20 @@ def load_model(name: str | Path, device: str = "cpu") -> Model:
 
     field, metadata = load_field(name)
     return Model(field, metadata, device=choose_device(device))
+
+
+def teach(knowledge: str | Path, model: Model | None = None) -> Teacher:
+    """Process knowledge from its file, on its reference, ready to be transferred to targets.
+
+    `model` is the knowledge's category in the zoo unless given. Raises ProcessError for knowledge
+    that is wrong somewhere, naming field and value, CloudError for a reference that cannot be used,
+    and ModelError for a model of another category.
+    """
+    from nrdf.process.lesson import read_lesson
+    from nrdf.process.transfer import Teacher
+
+    lesson = read_lesson(knowledge)
+    return Teacher(lesson, load_model(lesson.knowledge.category) if model is None else model)
 
 
 def __getattr__(name: str) -> Any:

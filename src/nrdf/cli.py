@@ -21,11 +21,11 @@ NOTES = """
 Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
 Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
-message that says what to do; 3 where a limit that was set is not met (--strict);
-130 after Ctrl-C."""
+message that says what to do; 3 where a limit that was set is not met, or with
+--strict where anything is doubtful; 130 after Ctrl-C."""
 
 RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc", "ablate")
-GROUPS = ("eval",)
+GROUPS = ("eval", "knowledge")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 
 
@@ -34,16 +34,22 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.ablate import ablate
     from nrdf.commands.align import align
     from nrdf.commands.evaluate import bench, evaluations
+    from nrdf.commands.export import export
     from nrdf.commands.information import info, zoo
+    from nrdf.commands.knowledge import knowledge
     from nrdf.commands.retrieve import retrieve
     from nrdf.commands.scan import scan
     from nrdf.commands.shapes import boxes, correspond, prepare, synth
     from nrdf.commands.show import demo
     from nrdf.commands.train import train
+    from nrdf.commands.transfer import transfer
 
     return {
         "retrieve": retrieve,
         "align": align,
+        "knowledge": knowledge,
+        "transfer": transfer,
+        "export": export,
         "demo": demo,
         "info": info,
         "scan": scan,

@@ -37,8 +37,18 @@ class TrainingError(NrdfError):
     """A training run that cannot go on: losses that stay infinite or undefined."""
 
 
+class ProcessError(NrdfError):
+    """Process knowledge, a tool path or a job that cannot be used."""
+
+
 class OutputError(NrdfError):
     """An output folder that is not empty, or that cannot be written."""
+
+
+class LimitError(NrdfError):
+    """A limit that the user set on a result is not met; the result is there all the same."""
+
+    exit_code = 3
 
 
 def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> str:

@@ -1,9 +1,4 @@
-"""Pictures of point clouds with their regions, for a person to look at.
-
-Points are drawn as small shaded discs that lie in the surface, nearest on top; what faces away is
-left out. The pinholes between discs are closed in the depth image, edges are set off by depth
-(eye-dome lighting: Boucheny 2009), and the whole is drawn twice as large and reduced.
-"""
+"""Pictures of point clouds with their regions and the lines on them, for a person to look at."""
 
 from __future__ import annotations
 
@@ -16,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from nrdf.errors import OutputError
 from nrdf.geometry import canonical_transform, estimate_normals, thin
+from nrdf.render import FRONT, Camera, Scene, Strokes, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,27 +28,12 @@ PALETTE = (
     "#882255", "#44AA99", "#999933", "#332288", "#AA4499",
 )  # fmt: skip
 """Okabe and Ito's colours for the colour-blind, then those of Tol's "muted" that differ most."""
+PALE, DEEP = 0.55, 0.55
+"""Shares of a region's colour in the region, and in the lines on it, where there are lines."""
 MOST_POINTS = 20_000
-_OVERSAMPLING = 2
 _MARGIN = 0.05  # canonical, around each object
 
 
-@dataclass(frozen=True)
-class Camera:
-    """Orthographic view: `azimuth` (rad) about +Y from +X towards +Z, `elevation` (rad)."""
-
-    azimuth: float
-    elevation: float
-
-    def axes(self) -> np.ndarray:
-        """Rows right, up, towards the viewer, each a unit vector: (3, 3)."""
-        a, e = self.azimuth, self.elevation
-        toward = np.array([np.cos(e) * np.cos(a), np.sin(e), np.cos(e) * np.sin(a)])
-        right = np.array([np.sin(a), 0.0, -np.cos(a)])
-        return np.stack([right, np.cross(toward, right), toward])
-
-
-FRONT = Camera(0.65, 0.38)
 OTHER_SIDES = (
     Camera(0.65 + np.pi, 0.38),
     Camera(0.65, -0.45),
@@ -67,7 +47,8 @@ class Panel:
     """One object in a picture.
 
     points: (n, 3), any unit, +X forward, +Y up; normals: (n, 3) outward, or None to estimate them;
-    regions: name to indices (k,) or boolean mask (n,); note: a line under the title.
+    regions: name to indices (k,) or boolean mask (n,); note: a line under the title. lines: name of
+    a region to lines (k, 3) on it, such as a tool's; its colour is paler then, and theirs deep.
     """
 
     title: str
@@ -75,6 +56,7 @@ class Panel:
     normals: np.ndarray | None = None
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     note: str = ""
+    lines: Mapping[str, Sequence[np.ndarray]] = field(default_factory=dict)
 
 
 def region_colours(names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -87,10 +69,12 @@ def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> 
     """Write a picture of `panels` side by side, one colour a region; `path`'s ending is its format.
 
     The same camera is used for all of them, and a second row is added from another side if some
-    region could hardly be seen. `size`: width of a panel in pixels. Takes about 0.2 s a panel.
-    Raises OutputError if the file cannot be written.
+    region could hardly be seen (beside the first for one panel). `size`: width of a panel in
+    pixels. Takes about 0.2 s a panel. Raises OutputError if the file cannot be written.
     """
     rows, colours = render_panels(panels, size)
+    if len(panels) == 1:
+        rows = [_of_one_height([row[0] for row in rows])]
     _compose(rows, panels, colours, Path(path), size)
 
 
@@ -101,7 +85,7 @@ def render_panels(
 
     One row a view, in it an array (h, size, 3) in [0, 1] for each panel, all of the same scale.
     """
-    names = list(dict.fromkeys(name for panel in panels for name in panel.regions))
+    names = list(dict.fromkeys(n for panel in panels for n in (*panel.regions, *panel.lines)))
     colours = region_colours(names)
     drawn = [_prepare(panel, names) for panel in panels]
     rows = [_row(drawn, colours, FRONT, size)]
@@ -111,18 +95,33 @@ def render_panels(
     return rows, colours
 
 
-@dataclass(frozen=True)
-class _Prepared:
-    """A panel ready to draw: canonical points, normals (n, 3), region (n,), -1 for none, and the
-    radius (n,) of each disc."""
+def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:
+    """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side
+    and with its own lines."""
+    every = list(dict.fromkeys((*panel.regions, *panel.lines)))
+    table = np.array([*region_colours(every).values(), BASE_COLOUR])
+    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+    scene = _prepare(panel, every)
 
-    points: np.ndarray
-    normals: np.ndarray
-    region: np.ndarray
-    radius: np.ndarray
+    def draw(name: str) -> np.ndarray:
+        own = scene.region == every.index(name)
+        if not own.any():
+            return np.ones((size, size, 3), np.float32)
+        axes = Camera.towards(scene.normals[own].mean(axis=0)).axes()
+        view = scene.points @ axes.T
+        low, high = view[own].min(axis=0)[:2], view[own].max(axis=0)[:2]
+        side = 1.2 * float((high - low).max()) + _MARGIN
+        corner = (low + high - side) / 2
+        near = ((view[:, :2] > corner - 0.05) & (view[:, :2] < corner + side + 0.05)).all(axis=1)
+        colours = pale if scene.lines else table
+        drawn = scene.select(near, every.index(name))
+        return render(drawn, axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return dict(zip(names, pool.map(draw, names), strict=True))
 
 
-def _prepare(panel: Panel, names: list[str]) -> _Prepared:
+def _prepare(panel: Panel, names: list[str]) -> Scene:
     points = np.asarray(panel.points, np.float64)
     region = np.full(len(points), -1)
     # Where regions overlap, the one listed last is on top.
@@ -139,11 +138,16 @@ def _prepare(panel: Panel, names: list[str]) -> _Prepared:
     smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-12)
     spacing = distance[:, -1] * np.sqrt(np.pi / 6.0)
     typical = float(np.median(spacing))
-    return _Prepared(points, smooth, region[kept], np.clip(spacing, 0.6 * typical, 1.4 * typical))
+    radius = np.clip(spacing, 0.6 * typical, 1.4 * typical)
+    lines = [
+        Strokes(names.index(name), tuple((np.asarray(line) - centre) / scale for line in drawn))
+        for name, drawn in panel.lines.items()
+    ]
+    return Scene(points, smooth, region[kept], radius, tuple(lines))
 
 
 def _row(
-    drawn: list[_Prepared], colours: dict[str, np.ndarray], camera: Camera, size: int
+    drawn: list[Scene], colours: dict[str, np.ndarray], camera: Camera, size: int
 ) -> list[np.ndarray]:
     """Pictures (h, size, 3), all of the same height and scale, of prepared clouds."""
     axes = camera.axes()
@@ -153,138 +157,42 @@ def _row(
     pixels = size / (high[0] - low[0])
     shape = (int(np.ceil(pixels * (high[1] - low[1]))), size)
     table = np.array([*colours.values(), BASE_COLOUR])
+    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
 
-    def draw(cloud: _Prepared, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    def draw(cloud: Scene, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         first = np.maximum(np.floor((corner[0] - _MARGIN - low) * pixels).astype(int), 0)
         last = np.minimum(np.ceil((corner[1] + _MARGIN - low) * pixels).astype(int), shape[::-1])
         canvas = np.ones((*shape, 3), np.float32)
-        canvas[first[1] : last[1], first[0] : last[0]] = _render(
-            cloud, axes, low + first / pixels, pixels, tuple((last - first)[::-1]), table
-        )
+        canvas[first[1] : last[1], first[0] : last[0]] = render(
+            cloud, axes, low + first / pixels, pixels, tuple((last - first)[::-1]),
+            pale if cloud.lines else table, DEEP * table,
+        )  # fmt: skip
         return canvas[::-1]
 
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         return list(pool.map(draw, drawn, corners))
 
 
-def _render(
-    cloud: _Prepared,
-    axes: np.ndarray,
-    corner: np.ndarray,
-    pixels: float,
-    shape: tuple[int, int],
-    table: np.ndarray,
-) -> np.ndarray:
-    """One cloud on white, (h, w, 3) in [0, 1] with the lowest row first, h and w by `shape`.
-
-    `corner` (2,) is the place of the first pixel's corner, `pixels` their number per unit length.
-    """
-    shape, pixels = (_OVERSAMPLING * shape[0], _OVERSAMPLING * shape[1]), _OVERSAMPLING * pixels
-    front = np.flatnonzero(cloud.normals @ axes[2] > 0.0)
-    owner, depth = _splat(cloud, front, axes, corner, pixels, shape)
-    spacing = float(np.median(cloud.radius)) * pixels
-    owner, depth = _close_pinholes(owner, depth, int(2.0 * spacing) | 1, 4.0 * spacing / pixels)
-    # A little blur of the outline takes off the discs' roundness.
-    cover = ndimage.gaussian_filter((owner >= 0).astype(np.float32), 0.35 * spacing)
-    painted = (owner >= 0) & (cover > 0.5)
-
-    light = np.array([-0.35, 0.75, 0.6]) @ axes
-    lit = cloud.normals @ (light / np.linalg.norm(light))
-    shade = 0.62 + 0.38 * np.clip(0.5 + 0.5 * lit, 0.0, 1.0) ** 1.2
-    colour = (table[cloud.region] * shade[:, None]).astype(np.float32)
-    image = np.ones((*shape, 3), np.float32)
-    image[painted] = colour[owner[painted]]
-    image *= _eye_dome(np.where(painted, depth, np.float32(-1.5)), _OVERSAMPLING)[..., None]
-    steps = range(_OVERSAMPLING)
-    parts = [image[i::_OVERSAMPLING, j::_OVERSAMPLING] for i in steps for j in steps]
-    return np.clip(np.add.reduce(parts) / np.float32(len(parts)), 0.0, 1.0)
-
-
-def _splat(
-    cloud: _Prepared,
-    chosen: np.ndarray,
-    axes: np.ndarray,
-    corner: np.ndarray,
-    pixels: float,
-    shape: tuple[int, int],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the point seen at each pixel, -1 for none, and its depth, both `shape`."""
-    view = (cloud.points[chosen] @ axes.T).astype(np.float32)
-    normal = (cloud.normals[chosen] @ axes.T).astype(np.float32)
-    x, y = ((view[:, :2] - corner.astype(np.float32)) * np.float32(pixels)).T
-    radius = (0.7 * pixels * cloud.radius[chosen]).astype(np.float32)
-    slope = -normal[:, :2] / np.maximum(normal[:, 2:], 0.35)
-    reach = int(np.ceil(radius.max()))
-    offset = np.arange(-reach, reach + 1)
-    dx, dy = (grid.ravel() for grid in np.meshgrid(offset, offset))
-    owner = np.full(shape[0] * shape[1], -1)
-    nearness = np.full(shape[0] * shape[1], -np.inf, np.float32)
-    depth = np.full(shape[0] * shape[1], -np.inf, np.float32)
-    for start in range(0, len(chosen), 512):
-        part = slice(start, start + 512)
-        column, row = np.floor(x[part]).astype(np.int32), np.floor(y[part]).astype(np.int32)
-        ex = (dx + (column + np.float32(0.5) - x[part])[:, None]).astype(np.float32)
-        ey = (dy + (row + np.float32(0.5) - y[part])[:, None]).astype(np.float32)
-        # The disc's plane gives each pixel its depth and its distance from the disc's centre.
-        rise = slope[part, :1] * ex + slope[part, 1:] * ey
-        squared = ex * ex + ey * ey + rise * rise
-        which, at = np.nonzero(squared <= radius[part, None] ** 2)
-        px, py = column[which] + dx[at], row[which] + dy[at]
-        inside = (px >= 0) & (px < shape[1]) & (py >= 0) & (py < shape[0])
-        which, at, pixel = which[inside], at[inside], (py * shape[1] + px)[inside]
-        z = view[part, 2][which] + rise[which, at] / np.float32(pixels)
-        # Of discs in one surface, the one whose centre is nearest wins: cones instead of discs.
-        near = z - np.float32(1.0 / pixels) * np.sqrt(squared[which, at])
-        np.maximum.at(nearness, pixel, near)
-        wins = near == nearness[pixel]
-        owner[pixel[wins]], depth[pixel[wins]] = chosen[part][which[wins]], z[wins]
-    return owner.reshape(shape), depth.reshape(shape)
-
-
-def _close_pinholes(
-    owner: np.ndarray, depth: np.ndarray, width: int, tolerance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Fill gaps narrower than `width` pixels through which something farther is seen."""
-    flat = np.where(owner >= 0, depth, np.float32(-10.0))
-    closed = ndimage.minimum_filter(ndimage.maximum_filter(flat, width), width)
-    hole = closed > flat + tolerance
-    if not hole.any() or hole.all():
-        return owner, depth
-    nearest = ndimage.distance_transform_edt(
-        hole | (owner < 0), return_distances=False, return_indices=True
-    )
-    source = tuple(axis[hole] for axis in nearest)
-    owner, depth = owner.copy(), depth.copy()
-    owner[hole], depth[hole] = owner[source], closed[hole]
-    return owner, depth
-
-
-def _eye_dome(depth: np.ndarray, reach: int) -> np.ndarray:
-    """Factor in (0, 1] that darkens pixels just behind a nearer neighbour."""
-    # The background is far behind, but its own pixels stay white.
-    background = depth <= -1.5
-    total = np.zeros_like(depth)
-    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        for r in (reach, 2 * reach):
-            shifted = np.roll(depth, (r * dy, r * dx), axis=(0, 1))
-            total += np.clip(shifted - depth - np.float32(0.006), 0.0, np.float32(0.12))
-    return np.where(background, 1.0, np.exp(-1.6 * total))
-
-
-def _hidden_regions(drawn: list[_Prepared], count: int) -> list[int]:
+def _hidden_regions(drawn: list[Scene], count: int) -> list[int]:
     """Regions of which less than a quarter of the points can be seen from the front."""
     return [i for i in range(count) if _facing(drawn, i, FRONT) < 0.25]
 
 
-def _best_side(drawn: list[_Prepared], hidden: list[int]) -> Camera:
+def _best_side(drawn: list[Scene], hidden: list[int]) -> Camera:
     return max(OTHER_SIDES, key=lambda c: sum(min(_facing(drawn, i, c), 0.4) for i in hidden))
 
 
-def _facing(drawn: list[_Prepared], region: int, camera: Camera) -> float:
+def _facing(drawn: list[Scene], region: int, camera: Camera) -> float:
     """Share of a region's points, over all clouds, that face the camera; 1 if there are none."""
     toward = camera.axes()[2]
     normals = np.concatenate([cloud.normals[cloud.region == region] for cloud in drawn])
     return float((normals @ toward > 0.1).mean()) if len(normals) else 1.0
+
+
+def _of_one_height(images: list[np.ndarray]) -> list[np.ndarray]:
+    """Pictures with white above the lower ones."""
+    tall = max(len(image) for image in images)
+    return [np.pad(i, ((tall - len(i), 0), (0, 0), (0, 0)), constant_values=1.0) for i in images]
 
 
 def _compose(
@@ -301,13 +209,13 @@ def _compose(
     dpi = 100
     header = 62 if any(panel.note for panel in panels) else 40
     footer = 50 if colours else 10
-    width = size * len(panels)
+    width = size * len(rows[0])
     height = header + footer + sum(row[0].shape[0] for row in rows)
     figure = Figure((width / dpi, height / dpi), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     top = height - header
     for i, panel in enumerate(panels):
-        x = (i + 0.5) * size / width
+        x = (i + 0.5) / len(panels)
         text: dict[str, Any] = {"ha": "center", "va": "top", "family": "DejaVu Sans"}
         figure.text(x, 1 - 12 / height, panel.title, size=13, weight="bold", color="#222", **text)
         figure.text(x, 1 - 38 / height, panel.note, size=10.5, color="#666", **text)

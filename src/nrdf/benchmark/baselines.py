@@ -13,7 +13,7 @@ from nrdf.cloud import PointCloud
 from nrdf.geometry import bounding_box, canonical_transform, estimate_normals, fibonacci_directions
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
 from nrdf.regions.region import region_indices
-from nrdf.shapes.registration import RegistrationTemplate
+from nrdf.shapes.registration import Carriers, RegistrationTemplate
 
 SEED = 0
 TEMPLATE_POINTS = 2048
@@ -23,7 +23,6 @@ _NEIGHBOURS = 9  # of each normal's plane
 _DIRECTIONS = 60
 _CAMERA = 10.0  # canonical distance of the viewpoints from the object's middle
 _SPHERE = 1e4  # radius of the sphere that points are flipped at, in farthest distances from it
-_CARRIERS = 4  # template points that carry each point of the reference
 
 
 class Copied:
@@ -100,18 +99,14 @@ class _Template:
         self.points, self.normals = points, normals
         self.chosen = np.random.default_rng(SEED).permutation(len(points))[:TEMPLATE_POINTS]
         self.registered = RegistrationTemplate(points[self.chosen], normals[self.chosen])
-        count = min(_CARRIERS, len(self.chosen))
-        distance, self.carriers = cKDTree(points[self.chosen]).query(points, range(1, count + 1))
-        weight = 1.0 / (distance + 1e-3) ** 2
-        self.weight = weight / weight.sum(axis=1, keepdims=True)
+        self.carriers = Carriers(points, self.chosen)
 
     def map_surface(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Where the reference's points arrive on a target (m, 3) with normals: (n, 3)."""
         rng = np.random.default_rng(SEED + 1)
         sample = rng.permutation(len(points))[: 2 * TEMPLATE_POINTS]
         arrived = self.registered.register(points[sample], normals[sample]).points
-        moved = (arrived - self.points[self.chosen])[self.carriers]
-        return self.points + np.einsum("nk,nka->na", self.weight, moved)
+        return self.points + self.carriers.carry(arrived - self.points[self.chosen])
 
 
 def hidden_point_normals(points: np.ndarray) -> np.ndarray:

@@ -39,6 +39,17 @@ class MethodResult:
         """Mean over all pairs and regions that have a value; NaN if none has."""
         return _mean(self.values(metric).ravel())
 
+    def by_confidence(self, metric: str = "cd-l1") -> tuple[float, float] | None:
+        """Mean of the quarter of all regions that the method is surest of, and of the quarter that
+        it is least sure of; None for a method without confidence."""
+        if not all(pair.confidence for pair in self.pairs):
+            return None
+        sure = [[pair.confidence[roi] for roi in self.rois] for pair in self.pairs]
+        order = np.argsort(-np.array(sure), axis=None, kind="stable")
+        values = self.values(metric).ravel()[order]
+        quarter = max(1, len(values) // 4)
+        return _mean(values[:quarter]), _mean(values[-quarter:])
+
     @property
     def seconds(self) -> np.ndarray:
         """Wall time of each pair, (pairs,)."""
@@ -115,7 +126,8 @@ def run_pair(
     seconds = time.perf_counter() - start
     figures = {roi: score(found[roi], target, roi, category) for roi in reference.regions}
     points = {roi: len(found[roi]) for roi in reference.regions}
-    return PairResult(reference.name, target.name, seconds, points, figures)
+    confidence = dict(getattr(match, "confidence", {}))
+    return PairResult(reference.name, target.name, seconds, points, figures, confidence)
 
 
 def _run(task: _Task) -> PairResult:

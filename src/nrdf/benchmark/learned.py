@@ -16,12 +16,14 @@ class FieldMatch:
     """A field with an inverse: ours of either preset, or IMDC's.
 
     association: "mask", or "points": C's prediction of each region point, snapped to the nearest
-    target point by position alone (paper, eq. 9). The last reference stays taught, as in use: a
+    target point by position alone (paper, eq. 9). refine: move the mapped reference onto the target
+    in a few steps first. The last reference stays taught, as in use: a
     target is embedded in every call.
     """
 
-    def __init__(self, model: Model, association: str) -> None:
-        self.model, self.association = model, association
+    def __init__(self, model: Model, association: str, refine: bool = False) -> None:
+        self.model, self.association, self.refine = model, association, refine
+        self.confidence: dict[str, float] = {}
         self._taught: Taught | None = None
 
     def __call__(
@@ -29,7 +31,8 @@ class FieldMatch:
     ) -> dict[str, np.ndarray]:
         if self._taught is None or self._taught.reference.cloud is not reference:
             self._taught = self.model.set_reference(reference)
-        matches = self._taught.retrieve_all(regions, target, self.association)
+        matches = self._taught.retrieve_all(regions, target, self.association, self.refine)
+        self.confidence = {name: match.score for name, match in matches.items()}
         if self.association == "mask":
             return {name: match.indices for name, match in matches.items()}
         tree = cKDTree(target.points)

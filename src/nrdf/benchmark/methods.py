@@ -4,7 +4,8 @@
 (m,) or masks (n,)) and another cloud, and gives indices of the target's points by name. A method
 that moves the region's own points gives the target point that each of them is snapped to, in their
 order, so a target point may occur several times and counts as often in distances; one that finds a
-mask gives every point of it once.
+mask gives every point of it once. A method that knows how sure it is has `confidence`, by name, of
+its last call.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ METHODS = {
     "imdc": Entry("IMDC, its inverse's points snapped", "imdc", "imdc"),
     "nrdf-paper": Entry("NRDF as in the paper, C's points snapped (eq. 9)", "paper", "paper"),
     "nrdf": Entry("the default field, region as a mask", "default"),
+    "nrdf-refined": Entry("the same, moved onto the target in a few steps", "default"),
     "nrdf-points": Entry("the default field, C's points snapped (eq. 9)", "default"),
 }
 """By name, in the order of the paper's table: nothing learned, rivals, ours."""
@@ -114,7 +116,8 @@ def _build(spec: MethodSpec) -> Match:
         return DescriptorSearch(model, energy=spec.name == "ndf-energy").match
     from nrdf.benchmark.learned import FieldMatch
 
-    return FieldMatch(model, "mask" if spec.name == "nrdf" else "points")
+    association = "mask" if spec.name in ("nrdf", "nrdf-refined") else "points"
+    return FieldMatch(model, association, refine=spec.name == "nrdf-refined")
 
 
 def _chosen_models(models: Sequence[str]) -> dict[str, str]:

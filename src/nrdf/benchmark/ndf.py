@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from nrdf.cloud import PointCloud
-from nrdf.regions.model import Embedded, Model
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
 
 STARTS = 4

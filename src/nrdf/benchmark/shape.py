@@ -22,7 +22,8 @@ from nrdf.benchmark.metrics import METRICS, MISSED, chamfer_l1
 from nrdf.cloud import PointCloud
 from nrdf.errors import ConfigError, DataError, NrdfError, OutputError, unknown_name
 from nrdf.ply import write_atomically
-from nrdf.regions.model import Embedded, Model
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
 from nrdf.shapes.pool import CRASHED, each
 

@@ -34,7 +34,8 @@ class PairResult:
     """One method on one pair.
 
     seconds: wall time of the call; points: how many were found, by region; figures: each metric
-    (`nrdf.benchmark.metrics.METRICS`) by region, None where it has no value.
+    (`nrdf.benchmark.metrics.METRICS`) by region, None where it has no value; confidence: the
+    method's own, by region, empty where it has none.
     """
 
     reference: str
@@ -42,6 +43,7 @@ class PairResult:
     seconds: float
     points: dict[str, int]
     figures: dict[str, dict[str, float | None]]
+    confidence: dict[str, float]
 
 
 class PairStore:
@@ -141,9 +143,10 @@ def _parsed(line: str, rois: tuple[str, ...]) -> tuple[str, PairResult | None]:
         }
         points = {roi: int(content["points"][roi]) for roi in rois}
         names = str(content["reference"]), str(content["target"])
-        result = PairResult(*names, float(content["seconds"]), points, figures)
+        confidence = {roi: float(value) for roi, value in content["confidence"].items()}
+        result = PairResult(*names, float(content["seconds"]), points, figures, confidence)
         return str(content["fingerprint"]), result
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         return "", None
 
 

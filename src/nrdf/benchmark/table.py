@@ -105,6 +105,7 @@ def markdown(results: Sequence[MethodResult], benchmark: Benchmark, metric: str)
     for result in results:
         means = [_text(result.mean(name), chosen.digits) for name, chosen in METRICS.items()]
         lines.append(_line([f"`{result.spec.name}`", *means, str(result.missed)]))
+    lines += ["", *(f"- {text}" for text in confidence_lines(results))]
     lines += [
         "",
         "Seconds a pair: median wall time of finding all regions on a target, the reference taught "
@@ -114,17 +115,32 @@ def markdown(results: Sequence[MethodResult], benchmark: Benchmark, metric: str)
     return "\n".join(lines) + "\n"
 
 
+def confidence_lines(results: Sequence[MethodResult]) -> list[str]:
+    """For each method with confidence: CD-L1 where it is sure, and where it is not."""
+    lines = []
+    for result in results:
+        quarters = result.by_confidence()
+        if quarters is not None:
+            sure, unsure = quarters
+            lines.append(
+                f"confidence of {result.spec.name}: mean CD-L1 {sure:.4f} in the quarter of "
+                f"regions of highest confidence, {unsure:.4f} in the quarter of lowest"
+            )
+    return lines
+
+
 def to_csv(results: Sequence[MethodResult], benchmark: Benchmark) -> str:
     """A row a method, pair and region with every metric; empty where one has no value."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    columns = ["category", "labels", "method", "reference", "target", "roi", "points"]
+    columns = ["category", "labels", "method", "reference", "target", "roi", "points", "confidence"]
     writer.writerow([*columns, *METRICS, "seconds_a_pair"])
     for result in results:
         for pair in result.pairs:
             for roi in benchmark.rois:
                 which = [benchmark.category, benchmark.labels, result.spec.name]
-                which += [pair.reference, pair.target, roi, str(pair.points[roi])]
+                sure = f"{pair.confidence[roi]:.6g}" if pair.confidence else ""
+                which += [pair.reference, pair.target, roi, str(pair.points[roi]), sure]
                 values = (pair.figures[roi][name] for name in METRICS)
                 figures = ["" if value is None else f"{value:.9g}" for value in values]
                 writer.writerow([*which, *figures, f"{pair.seconds:.4f}"])

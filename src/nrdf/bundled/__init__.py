@@ -16,6 +16,9 @@ from nrdf.errors import DataError, unknown_name
 
 REFERENCE = "reference"
 TARGETS = ("ladder-back", "rocker", "armchair")
+KNOWLEDGE = Path(__file__).parent / "chair.yaml"
+"""What is done to the reference's five regions: a knowledge file."""
+REGIONS_FILE = "reference-regions.npz"
 
 
 def bundled_chair(name: str) -> tuple[PointCloud, dict[str, np.ndarray]]:

@@ -33,12 +33,13 @@ def versions() -> dict[str, str]:
     return found
 
 
-def table(title: str, *columns: str) -> Table:
-    """A plain table; the first column and those without a heading are text, the others numbers."""
+def table(title: str, *columns: str, texts: int = 1) -> Table:
+    """A plain table; the first `texts` columns and those without a heading are text, the others
+    numbers."""
     made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     made.show_header = any(columns)
     for i, column in enumerate(columns):
-        justify: JustifyMethod = "right" if i and column else "left"
+        justify: JustifyMethod = "right" if i >= texts and column else "left"
         made.add_column(column, justify=justify, header_style="dim")
     return made
 

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score methods: on scans (bsrc), on exact truth (families), on the shapes themselves (shape).
+    """Score methods: on scans (bsrc), exact truth (families, carry), shapes themselves (shape).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
+    from nrdf.commands.evaluate_carry import carry
     from nrdf.commands.evaluate_shape import shape
 
-    return {"bsrc": bsrc, "families": families, "shape": shape}
+    return {"bsrc": bsrc, "families": families, "carry": carry, "shape": shape}
 
 
 def bsrc(
@@ -56,7 +57,7 @@ def bsrc(
     picture; interrupted, the same command goes on where it was.
 
     Methods: copy, box, copy-normals, box-normals, registration (nothing learned); ndf, ndf-energy,
-    imdc, nrdf-paper (trained rivals); nrdf, nrdf-points (the default field).
+    imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default field).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
@@ -66,7 +67,7 @@ def bsrc(
         out: Folder for tables, figures of every pair, and a picture of the best learned method.
         method: Methods to run, rows of the table.
         model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
-            is for nrdf and nrdf-points, which otherwise have the category's model in the zoo.
+            is for those of the default field, which otherwise have the category's model in the zoo.
         runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
         metric: Metric of the table: cd-l1, chamfer-l1, squared-cd, f-score-0.01, f-score-0.02,
@@ -116,7 +117,7 @@ def bsrc(
 
 
 def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) -> None:
-    from nrdf.benchmark.table import caption, cells, headings, rows
+    from nrdf.benchmark.table import caption, cells, confidence_lines, headings, rows
 
     title, formula = caption(benchmark, metric)
     shown = table(title, "", *headings(benchmark))
@@ -128,6 +129,8 @@ def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) 
     if metric == "cd-l1":
         console.print("published: all 90 pairs of a category, fields trained on other data")
     console.print(formula)
+    for line in confidence_lines(results):
+        console.print(line)
 
 
 def families(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,7 +18,7 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
-from nrdf.errors import CloudError, RegionError
+from nrdf.errors import CloudError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from nrdf.cloud import PointCloud
     from nrdf.picture import Panel
     from nrdf.regions.match import Match
-    from nrdf.regions.model import Embedded
+    from nrdf.regions.embedded import Embedded
 
 log = logging.getLogger(__name__)
 
@@ -39,6 +38,7 @@ def retrieve(
     target: Path,
     out: Path,
     method: Literal["mask", "points"] = "mask",
+    refine: bool = False,
     up: str | None = None,
     sensor: tuple[float, ...] = (),
     unit: Unit | None = None,
@@ -73,6 +73,8 @@ def retrieve(
         out: Folder to write; made if missing.
         method: mask: each target point asks the mapped reference points nearest to it;
             points: each region point's prediction is snapped to the target (the paper's).
+        refine: Move the mapped reference onto the target in a few steps first, about half a second
+            more.
         up: The target is a scan; direction in it that points up: x, y, z, -x, -y, -z, or 'x y z',
             or auto.
         sensor: Where the scan's sensors stood: x y z of each. The file may say so as well.
@@ -90,6 +92,7 @@ def retrieve(
         clock = Clock()
         import nrdf
         from nrdf.picture import draw_regions
+        from nrdf.regions.files import read_regions, write_matches
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
@@ -102,12 +105,12 @@ def retrieve(
         else:
             scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
             target_cloud, doubts = scan.scan, scan.doubts
-        regions = read_regions(region)
+        regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
         embedded = loaded.embed(target_cloud) if scan is None else scan.embed()
-        matches = taught.retrieve_all(regions, embedded, method)
+        matches = taught.retrieve_all(regions, embedded, method, refine)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
         panels = [
@@ -123,6 +126,7 @@ def retrieve(
             "command": command_line(),
             "model": provenance(loaded.metadata),
             "method": method,
+            "refine": refine,
             "reference": describe_cloud(reference, reference_cloud),
             "target": describe_cloud(target, target_cloud),
             "coordinates": "the target file's own frame and unit",
@@ -154,48 +158,6 @@ class Clock:
         return sum(self.seconds.values())
 
 
-def read_regions(paths: tuple[Path, ...]) -> dict[str, np.ndarray]:
-    """Regions by name from files: points (m, 3), masks (n,) or indices (m,).
-
-    Raises RegionError for no file, arrays that cannot be read, names that occur twice or cannot be
-    file names, and CloudError for unreadable clouds.
-    """
-    regions: dict[str, np.ndarray] = {}
-    if not paths:
-        raise RegionError("no region given; name at least one file after --region")
-    for path in paths:
-        for name, values in _read_region_file(path).items():
-            if name in regions:
-                raise RegionError(f"two regions are called '{name}'; rename one of the files")
-            if not re.fullmatch(r"\w[\w .+-]*", name):
-                raise RegionError(
-                    f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
-                    "any of . + - _ are allowed, because it becomes a file name"
-                )
-            regions[name] = values
-    return regions
-
-
-def _read_region_file(path: Path) -> dict[str, np.ndarray]:
-    import zipfile
-
-    import numpy as np
-
-    from nrdf.cloud import read_cloud
-
-    if path.suffix.lower() in (".npy", ".npz"):
-        try:
-            with open(path, "rb") as file:
-                loaded = np.load(file, allow_pickle=False)
-                if isinstance(loaded, np.ndarray):
-                    return {path.stem: loaded}
-                if "points" not in loaded:
-                    return {name: loaded[name] for name in loaded.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise RegionError(f"cannot read the region file {path}: {error}") from None
-    return {path.stem: read_cloud(path).points}
-
-
 def reference_indices(
     regions: Mapping[str, np.ndarray], reference: PointCloud
 ) -> dict[str, np.ndarray]:
@@ -221,26 +183,6 @@ def target_panel(title: str, embedded: Embedded, regions: Mapping[str, np.ndarra
 
     shown = {name: np.isin(embedded.working, indices) for name, indices in regions.items()}
     return Panel(title, embedded.points, embedded.normals, shown)
-
-
-def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
-    """Write <region>.ply for each match into a folder."""
-    import numpy as np
-
-    from nrdf.cloud import write_cloud
-    from nrdf.picture import region_colours
-
-    colours = region_colours(list(matches))
-    for name, match in matches.items():
-        # Paler where less certain.
-        strength = 0.25 + 0.75 * match.confidence[:, None]
-        mixed = strength * colours[name] + (1 - strength)
-        write_cloud(
-            folder / f"{name}.ply",
-            target.select(match.indices),
-            colours=(255 * mixed).astype(np.uint8),
-            scalars={"confidence": match.confidence, "index": match.indices},
-        )
 
 
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:

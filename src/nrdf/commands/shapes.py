@@ -112,6 +112,7 @@ def boxes(
 def correspond(
     data: Positional[tuple[Path, ...]],
     templates: int = 12,
+    templates_from: Path | None = None,
     meshes: Path | None = None,
     workers: int | None = None,
 ) -> None:
@@ -125,6 +126,8 @@ def correspond(
     Args:
         data: Data folders of one category (of `nrdf prepare` or `nrdf synth`).
         templates: Number of shapes that serve as templates.
+        templates_from: The folder whose shapes may serve as templates; all of them unless given.
+            Boxes, for instance, are good to learn from and poor as templates.
         meshes: Folder of the meshes that the first data folder was prepared from: those that share
             their triangulation get exact correspondences too, vertex by vertex.
         workers: Processes; all cores unless given.
@@ -136,7 +139,9 @@ def correspond(
         for name, shapes in add_shared_topology(meshes.iterdir(), data[0]).items():
             console.print(f"{len(shapes)} shapes share their triangulation: group {name}")
     with progress_bar("shapes registered") as progress:
-        report = correspond_folders(list(data), templates, _cores(workers), progress=progress)
+        report = correspond_folders(
+            list(data), templates, _cores(workers), None, progress, templates_from
+        )
     console.print(
         f"{report.done} shapes registered, {report.skipped} were before; "
         f"templates: {', '.join(report.templates)}"

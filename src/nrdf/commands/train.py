@@ -29,8 +29,8 @@ def train(
     Args:
         category: What the shapes are; all of them must be of it.
         data: Data folders (of `nrdf prepare` or `nrdf synth`).
-        preset: default, paper or car: the configuration of that name, whose file says what it
-            costs.
+        preset: default, chair, car, paper, ndf, imdc, or one of the last three with -short:
+            the configuration of that name, whose file says what it costs.
         config: A configuration file of your own, instead of a preset.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
         out: The run's folder; runs/CATEGORY unless given.

@@ -15,7 +15,8 @@ import numpy as np
 from nrdf import ply
 from nrdf.errors import CloudError
 from nrdf.formats import meshes, pcd, tables
-from nrdf.formats.raw import UNITS, RawCloud, colours_of, intensity_of, stack
+from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
+from nrdf.units import METRES
 
 KNOWN_FORMATS = "PLY, PCD, XYZ/TXT/CSV/ASC/PTS, NPY, NPZ, OFF, OBJ, STL, GLB, ROS 2 bags"
 Reader = Callable[[Path, int], RawCloud]
@@ -70,7 +71,7 @@ def _read_ply(path: Path, mesh_samples: int) -> RawCloud:
         cloud.colours, cloud.intensity = colours_of(columns), intensity_of(columns)
     for comment in header.comments:
         word, _, rest = comment.partition(" ")
-        if word == "unit" and rest.strip() in UNITS:
+        if word == "unit" and rest.strip() in METRES:
             cloud.unit = rest.strip()
         elif word == "frame" and rest:
             cloud.frame = rest

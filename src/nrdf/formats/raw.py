@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-UNITS = ("m", "cm", "mm", "in")
-
 
 @dataclass
 class RawCloud:

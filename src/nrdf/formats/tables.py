@@ -9,7 +9,8 @@ import numpy as np
 
 from nrdf import ply
 from nrdf.errors import CloudError
-from nrdf.formats.raw import UNITS, RawCloud, colours_of, intensity_of, stack
+from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
+from nrdf.units import METRES
 
 _ALIASES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny"} | {
     "normal_z": "nz"
@@ -52,7 +53,7 @@ def read_npz(path: Path, _: int) -> RawCloud:
         cloud.colours = colours_of(dict(zip(("red", "green", "blue"), colours.T, strict=False)))
     cloud.intensity = found.get("intensity", cloud.intensity)
     unit = str(found.get("unit", ""))
-    cloud.unit = unit if unit in UNITS else None
+    cloud.unit = unit if unit in METRES else None
     cloud.frame = str(found["frame"]) if "frame" in found else None
     sensors = found.get("sensors", cloud.sensors)
     if sensors.ndim != 2 or sensors.shape[1] != 3 or sensors.dtype.kind not in "fiu":

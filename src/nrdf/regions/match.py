@@ -10,9 +10,9 @@ import numpy as np
 from nrdf.field.base import Inverse
 from nrdf.regions.presence import Presence
 
-ERROR_SCALE = 0.2
-"""Expected error, canonical, at which trust has fallen to 1/e. Chosen on unseen family chairs, so
-that confidence is about the share of points that are right."""
+TRUST_SCALE = 0.2
+"""Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
+and of the error that the field expects of itself."""
 FOUND = Presence("", 1.0, 1.0)
 
 
@@ -50,18 +50,24 @@ class Match:
 
 
 class Mapped(NamedTuple):
-    """Reference points on a target, canonical: points (m, 3), normals (m, 3), exists (m,) the
-    probability that the target has the place, error (m,) that the field expects of itself."""
+    """Reference points on a target, canonical: points (m, 3), normals (m, 3), existence (m,) in
+    [0, 1] (does the target have such a place?), error (m,) that the field expects; 1 and 0 for a
+    field that says nothing of the kind. moved: (m, 3), how far refinement has moved the points."""
 
     points: np.ndarray
     normals: np.ndarray
-    exists: np.ndarray
+    existence: np.ndarray
     error: np.ndarray
+    moved: np.ndarray
+
+    def shifted(self, moved: np.ndarray) -> Mapped:
+        """The same, moved by (m, 3)."""
+        return self._replace(points=self.points + moved, moved=self.moved + moved)
 
     @property
     def trust(self) -> np.ndarray:
         """(m,) in [0, 1]: that the place exists, and how small an error is expected."""
-        return self.exists * np.exp(-self.error / ERROR_SCALE)
+        return self.existence * np.exp(-self.error / TRUST_SCALE)
 
     def select(self, chosen: np.ndarray) -> Mapped:
         """The points at `chosen`, integers (k,) or a mask (m,)."""
@@ -75,8 +81,11 @@ def mapped_points(inverse: Inverse, normals: np.ndarray) -> Mapped:
     return Mapped(
         inverse.points[0].cpu().numpy(),
         normals if inverse.normals is None else inverse.normals[0].cpu().numpy(),
-        np.ones(count)
+        np.ones(count, np.float32)
         if inverse.existence is None
         else inverse.existence[0].sigmoid().cpu().numpy(),
-        np.zeros(count) if inverse.log_error is None else inverse.log_error[0].exp().cpu().numpy(),
+        np.zeros(count, np.float32)
+        if inverse.log_error is None
+        else inverse.log_error[0].exp().cpu().numpy(),
+        np.zeros((count, 3), np.float32),
     )

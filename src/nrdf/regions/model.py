@@ -7,27 +7,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import (
-    NORMAL_WEIGHT,
-    VOTERS,
-    oriented_features,
-    snap,
-    voters,
-)
-from nrdf.regions.match import Mapped, Match, mapped_points
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.embedded import Embedded, encoder_subset
+from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
+from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import find_presence
+from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
 
@@ -36,67 +31,6 @@ WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
 _CHUNK = 8192  # points described or inverted at a time
-# Chosen on unseen family chairs, so that confidence is about the share of points that are right.
-_DISTANCE_SCALE = 0.4  # canonical distance to the mapped point at which trust has fallen to 1/e
-
-
-@dataclass(frozen=True)
-class Embedded:
-    """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
-
-    cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
-    canonical. pose: from canonical coordinates to the cloud's. z: (1, d_z). seconds: time of each
-    phase.
-    """
-
-    cloud: PointCloud
-    working: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-    pose: Similarity
-    z: torch.Tensor
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    def original(self, points_canonical: np.ndarray) -> np.ndarray:
-        """Canonical points (m, 3) in the cloud's own frame and unit."""
-        return self.pose.to_scan(np.asarray(points_canonical, np.float64))
-
-    def canonical(self, points: np.ndarray) -> np.ndarray:
-        """Points (m, 3) of the cloud's own frame and unit in canonical coordinates."""
-        return self.pose.to_canonical(points)
-
-    def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Selected working points as indices of the whole cloud, and which working point each
-        follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
-        """
-        index = np.flatnonzero(selected[self.nearest_working])
-        return index, self.nearest_working[index]
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether every point of the cloud is in use."""
-        return len(self.working) == len(self.cloud.points)
-
-    @cached_property
-    def nearest_working(self) -> np.ndarray:
-        """The position in `working` of the point nearest to each point of the cloud."""
-        if self.is_whole:
-            return self.working
-        return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
-
-    def distance(self, mapped: Mapped) -> np.ndarray:
-        """Distance (m,) of mapped points from the working points, in position and normal."""
-        features = oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
-        return self._oriented_tree.query(features)[0]
-
-    @cached_property
-    def _oriented_tree(self) -> cKDTree:
-        return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))
-
-    @cached_property
-    def tree(self) -> cKDTree:
-        """The cloud's own points, for regions that are given as points."""
-        return cKDTree(self.cloud.points)
 
 
 class Model:
@@ -183,20 +117,38 @@ class Taught:
         self.reference = reference
         self._k = self._describe(reference.points, reference.normals)
 
-    def retrieve(self, region: Any, target: PointCloud | Embedded, method: str = "mask") -> Match:
+    @cached_property
+    def _refiner(self) -> Refiner:
+        return Refiner(self.reference.points, self.reference.normals)
+
+    def retrieve(
+        self,
+        region: Any,
+        target: PointCloud | Embedded,
+        method: str = "mask",
+        refine: bool = False,
+    ) -> Match:
         """Find one region on a target: `retrieve_all` for a single region."""
-        return self.retrieve_all({"region": region}, target, method)["region"]
+        return self.retrieve_all({"region": region}, target, method, refine)["region"]
 
     def retrieve_all(
-        self, regions: Mapping[str, Any], target: PointCloud | Embedded, method: str = "mask"
+        self,
+        regions: Mapping[str, Any],
+        target: PointCloud | Embedded,
+        method: str = "mask",
+        refine: bool = False,
     ) -> dict[str, Match]:
         """Find regions on a target, which is embedded and mapped once for all of them.
 
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
         method: "mask" maps the whole reference and lets each target point ask the mapped
-        reference points nearest in position and normal; "points" snaps C's prediction of each
+        reference points nearest in position and normal; parts of the target that are far from all
+        of them, by the error that the field expects, join a region only where they grow out of it
+        (`nrdf.regions.patches`). "points" snaps C's prediction of each
         region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
         gets no majority anywhere: use "points" for spots.
+        refine: move the mapped reference onto the target in a few steps of smooth registration
+        (`nrdf.regions.refine`), about half a second a target.
 
         Raises RegionError for a region that is empty or not on the reference (the message names
         it) or an unknown method, and CloudError for a target as `Model.embed` does.
@@ -210,69 +162,103 @@ class Taught:
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self.model.embed(target)
-        start = time.perf_counter()
-        mapped = self.map_surface(embedded)
-        embedded.seconds["map"] = time.perf_counter() - start
+        surface = self.map_surface(embedded, refine)
         start = time.perf_counter()
         if method == "mask":
-            matches = self._by_mask(chosen, mapped, embedded)
+            matches = self._by_mask(chosen, embedded, surface)
         else:
-            matches = {name: self._by_points(i, mapped, embedded) for name, i in chosen.items()}
-        usual = float(np.median(mapped.error))
-        for name, indices in chosen.items():
-            region = mapped.select(self._working_mask(indices))
-            presence = find_presence(region.exists, region.error, usual, embedded.distance(region))
-            matches[name] = matches[name].with_presence(presence)
+            matches = {
+                name: self._by_points(self.map_points(indices, embedded, surface), embedded)
+                for name, indices in chosen.items()
+            }
+        matches = {n: self._judged(m, chosen[n], embedded, surface) for n, m in matches.items()}
         embedded.seconds["associate"] = time.perf_counter() - start
         return matches
 
-    def map_surface(self, target: Embedded) -> Mapped:
+    def map_surface(self, target: Embedded, refine: bool = False) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
-        return self._invert(target, self._k, self.reference.normals)
+        start = time.perf_counter()
+        mapped = self._invert(target, self._k, self.reference.normals)
+        target.seconds["map"] = time.perf_counter() - start
+        if refine:
+            start = time.perf_counter()
+            moved = self._refiner.displacement(
+                mapped.points, mapped.normals, target.points, target.normals
+            )
+            mapped = mapped.shifted(moved)
+            target.seconds["refine"] = time.perf_counter() - start
+        return mapped
 
-    def map_points(self, indices: np.ndarray, target: Embedded) -> Mapped:
-        """Where reference points given by their indices (m,) in the cloud arrive on a target."""
+    def map_points(
+        self, indices: np.ndarray, target: Embedded, surface: Mapped | None = None
+    ) -> Mapped:
+        """Where reference points given by their indices (m,) in the cloud arrive on a target.
+
+        surface: what `map_surface` gave for the target, to follow it where it has been refined.
+        """
         reference = self.reference
         if reference.is_whole:
+            if surface is not None:
+                return surface.select(indices)
             return self._invert(target, self._k[:, indices], reference.normals[indices])
+        nearest = reference.nearest_working[indices]
         points = reference.canonical(reference.cloud.points[indices])
-        given = reference.cloud.normals
-        normals = (
-            given[indices] @ reference.pose.rotation
-            if given is not None
-            else reference.normals[reference.nearest_working[indices]]
-        )
+        normals = reference.normals[nearest]
+        if reference.cloud.normals is not None:
+            normals = reference.canonical_normals(reference.cloud.normals[indices])
+        mapped = self._invert(target, self._describe(points, normals), normals)
+        return mapped if surface is None else mapped.shifted(surface.moved[nearest])
+
+    def map_places(self, points: np.ndarray, normals: np.ndarray, target: Embedded) -> Mapped:
+        """Where any places of the reference's surface arrive on a target.
+
+        points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
+        """
+        points = self.reference.canonical(points)
+        normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
 
+    def _judged(
+        self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
+    ) -> Match:
+        """The match, without its points where the target lacks the region or shows it not."""
+        region = surface.select(self._working_mask(indices))
+        # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
+        off = target.distance(region.points - region.moved, region.normals)
+        usual = float(np.median(surface.error))
+        return match.with_presence(find_presence(region.existence, region.error, usual, off))
+
     def _by_mask(
-        self, chosen: dict[str, np.ndarray], mapped: Mapped, target: Embedded
+        self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped
     ) -> dict[str, Match]:
         asked, distance = voters(
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
-        trust = mapped.trust[asked] * np.exp(-distance / _DISTANCE_SCALE)
+        trust = mapped.trust[asked] * np.exp(-distance / TRUST_SCALE)
+        patches = find_patches(target.points, explained_by(distance, mapped.error[asked]))
         matches = {}
         for name, indices in chosen.items():
             member = self._working_mask(indices)[asked]
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
-            index, follows = target.to_all(votes > 0.5)
-            whole = self.reference.is_whole
-            arrived = mapped.points[indices] if whole else self.map_points(indices, target).points
+            voted = votes > 0.5
+            found = patches.joined(voted)
+            # Where much was voted in that nothing on the reference explains, the rest is doubtful.
+            confidence *= found.sum() / max(voted.sum(), 1)
+            index, follows = target.to_all(found)
+            arrived = self.map_points(indices, target, mapped)
             matches[name] = Match(
                 indices=index,
-                points=target.original(arrived),
+                points=target.original(arrived.points),
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
         return matches
 
-    def _by_points(self, indices: np.ndarray, mapped: Mapped, target: Embedded) -> Match:
-        whole = self.reference.is_whole
-        mapped = mapped.select(indices) if whole else self.map_points(indices, target)
+    def _by_points(self, mapped: Mapped, target: Embedded) -> Match:
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(nearest, return_index=True)
-        trust = mapped.trust * np.exp(-distance / _DISTANCE_SCALE)
+        trust = mapped.trust * np.exp(-distance / TRUST_SCALE)
         return Match(
             indices=target.working[found],
             points=target.original(mapped.points),
@@ -314,11 +300,3 @@ class Taught:
                 inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
                 parts.append(mapped_points(inverse, normals[start : start + _CHUNK]))
         return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
-
-
-def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of the points that the encoder sees: an even subset of `count`, which always holds
-    the extreme points of each axis, so that the embedding knows the bounding box exactly."""
-    chosen = thin(points, count, np.random.default_rng(0))
-    extremes = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
-    return np.union1d(chosen, extremes)

@@ -35,15 +35,15 @@ class Presence:
 
 
 def find_presence(
-    exists: np.ndarray, error: np.ndarray, usual_error: float, distance: np.ndarray
+    existence: np.ndarray, error: np.ndarray, usual_error: float, distance: np.ndarray
 ) -> Presence:
     """Presence of a region on a target from what the field says of its m mapped points.
 
-    exists: (m,) probabilities; error: (m,) expected, and `usual_error`, the median over the whole
+    existence: (m,) probabilities; error: (m,) expected; `usual_error`, the median over the whole
     reference, canonical, 0 where the field expects none; distance: (m,) of the mapped points from
     the target's points, in position and weighted normal.
     """
-    share = float(np.clip(exists.mean(), 1e-3, 1 - 1e-3))
+    share = float(np.clip(existence.mean(), 1e-3, 1 - 1e-3))
     off = max(float(np.quantile(distance, 0.8)), 1e-3) / _USUAL_DISTANCE
     score = _BIAS + _EXISTENCE * np.log(share / (1 - share)) + _DISTANCE * np.log(off)
     if usual_error > 0:

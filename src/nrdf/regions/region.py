@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -13,6 +14,8 @@ from nrdf.errors import RegionError
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""
+REGION_NAME = re.compile(r"\w[\w .+-]*")
+"""What a region may be called: its name becomes a file name."""
 _FORMS = "a region is a boolean mask (n,), integer indices (m,) or points (m, 3) on the reference"
 
 

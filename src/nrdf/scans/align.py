@@ -13,7 +13,8 @@ import numpy as np
 
 from nrdf.cloud import PointCloud, check_cloud
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.model import MINIMUM_POINTS, encoder_subset
+from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.scans.judge import Judge
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
 from nrdf.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright

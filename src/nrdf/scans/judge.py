@@ -18,7 +18,8 @@ from nrdf.errors import ModelError
 from nrdf.field.base import Inverse
 from nrdf.geometry import thin
 from nrdf.regions.association import NORMAL_WEIGHT
-from nrdf.regions.model import Model, encoder_subset
+from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.model import Model
 from nrdf.shapes.families import FAMILY_NAMES, get_family
 
 FIRST_SEED = 900_000  # of the members that serve as prototypes; no training set has them

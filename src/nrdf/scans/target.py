@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nrdf.cloud import PointCloud
-from nrdf.regions.model import Embedded, Match
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.match import Match
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
-from nrdf.scans.units import Unit, find_unit
+from nrdf.units import Unit, find_unit
 
 _FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
 _MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too

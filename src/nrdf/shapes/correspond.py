@@ -52,8 +52,11 @@ def correspond_folders(
     workers: int = 1,
     settings: RegistrationSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
+    templates_from: Path | None = None,
 ) -> CorrespondReport:
     """Add the groups `template-*` to every train and val shape of data folders (of one category).
+
+    Templates are chosen out of the train shapes of all folders, or of `templates_from` alone.
 
     Shapes that have them already, from the same templates and settings, are kept: an interrupted
     run goes on. `progress` is told (done, all). A worker needs about 70 MB a template. Raises
@@ -61,15 +64,16 @@ def correspond_folders(
     """
     settings = settings or RegistrationSettings()
     train = [path for folder in folders for path in shape_paths(folder, "train")]
-    if not 1 <= templates <= len(train):
-        where = ", ".join(str(folder) for folder in folders)
-        if not train:
+    eligible = train if templates_from is None else shape_paths(templates_from, "train")
+    if not 1 <= templates <= len(eligible):
+        where = ", ".join(map(str, folders if templates_from is None else [templates_from]))
+        if not eligible:
             raise DataError(f"no training shapes in {where or 'no folder'}: nothing to register")
         raise DataError(
-            f"{templates} templates cannot be chosen out of the {len(train)} training shapes in "
-            f"{where}; give 1 to {len(train)}"
+            f"{templates} templates cannot be chosen out of the {len(eligible)} training shapes in "
+            f"{where}; give 1 to {len(eligible)}"
         )
-    shapes = [read_shape(path) for path in train]
+    shapes = [read_shape(path) for path in eligible]
     chosen = choose_templates(shapes, templates)
     names = [shapes[index].name for index in chosen]
     key = hashlib.sha256(repr((names, settings)).encode()).hexdigest()[:12]

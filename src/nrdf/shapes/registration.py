@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 Array = np.ndarray
+_CARRIERS = 4
 
 
 @dataclass(frozen=True)
@@ -69,21 +70,26 @@ class RegistrationTemplate:
         squared = _squared_distances(self.points)
         self._kernels = [np.exp(-squared / (0.5 * r * r)) for r in self.settings.radii()]
 
-    def register(self, target_points: Array, target_normals: Array) -> Registration:
-        """Move the template onto a target given by points (m, 3) and unit normals (m, 3)."""
+    def register(
+        self, target_points: Array, target_normals: Array, start: tuple[Array, Array] | None = None
+    ) -> Registration:
+        """Move the template onto a target given by points (m, 3) and unit normals (m, 3).
+
+        `start`: points and unit normals (n, 3) from which to begin, where something better than
+        the bounding box is known.
+        """
         s = self.settings
         target = np.asarray(target_points, np.float32)
         normals = np.asarray(target_normals, np.float32)
-        low, high = self.points.min(0), self.points.max(0)
-        target_low, target_high = target.min(0), target.max(0)
-        extent = np.maximum(high - low, 1e-6)
-        box_copy = (self.points - low) / extent * (target_high - target_low) + target_low
-        base = (1 - s.start) * self.points + s.start * box_copy
+        if start is None:
+            base, own = self._from_box(target), self.normals
+        else:
+            base, own = (np.asarray(values, np.float32) for values in start)
         moved = base
         balance = len(base) / len(target)
         for kernel, normal_weight in zip(self._kernels, s.normal_weights(), strict=True):
-            to_target, target_index, to_moved, moved_index = self._match(
-                moved, target, normals, float(normal_weight)
+            to_target, target_index, to_moved, moved_index = _match(
+                moved, own, target, normals, float(normal_weight)
             )
             forward = np.exp(-((to_target / s.match_scale) ** 2)).astype(np.float32)
             backward = balance * np.exp(-((to_moved / s.match_scale) ** 2)).astype(np.float32)
@@ -97,17 +103,45 @@ class RegistrationTemplate:
                 sums[:, column] += np.bincount(moved_index, pulled[:, column], len(base))
             smooth = kernel @ sums
             moved = base + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-6)
-        distance, index, _, _ = self._match(moved, target, normals, s.normal_weight_end)
+        distance, index, _, _ = _match(moved, own, target, normals, s.normal_weight_end)
         return Registration(moved.astype(np.float32), index, distance)
 
-    def _match(
-        self, moved: Array, target: Array, normals: Array, normal_weight: float
-    ) -> tuple[Array, Array, Array, Array]:
-        moved_features = np.concatenate([moved, normal_weight * self.normals], 1)
-        target_features = np.concatenate([target, normal_weight * normals], 1)
-        to_target, target_index = cKDTree(target_features).query(moved_features)
-        to_moved, moved_index = cKDTree(moved_features).query(target_features)
-        return to_target, target_index, to_moved, moved_index
+    def _from_box(self, target: Array) -> Array:
+        """The template on its way from its own place to the target's bounding box."""
+        low, high = self.points.min(0), self.points.max(0)
+        target_low, target_high = target.min(0), target.max(0)
+        extent = np.maximum(high - low, 1e-6)
+        box_copy = (self.points - low) / extent * (target_high - target_low) + target_low
+        return (1 - self.settings.start) * self.points + self.settings.start * box_copy
+
+
+class Carriers:
+    """What moves a subset of points carries all of them along.
+
+    points: (n, 3); chosen: (k,) indices of the subset. Each point goes with its `_CARRIERS` nearest
+    of the subset, weighted by the inverse square of the distance.
+    """
+
+    def __init__(self, points: Array, chosen: Array) -> None:
+        count = min(_CARRIERS, len(chosen))
+        distance, self._nearest = cKDTree(points[chosen]).query(points, range(1, count + 1))
+        weight = 1.0 / (distance + 1e-3) ** 2
+        self._weight = weight / weight.sum(axis=1, keepdims=True)
+
+    def carry(self, displacement: Array) -> Array:
+        """Displacements (n, 3) of all points from those of the subset, (k, 3)."""
+        return np.einsum("nk,nka->na", self._weight, displacement[self._nearest])
+
+
+def _match(
+    moved: Array, own: Array, target: Array, normals: Array, normal_weight: float
+) -> tuple[Array, Array, Array, Array]:
+    """Nearest neighbours both ways in (position, weighted normal): distances and indices."""
+    moved_features = np.concatenate([moved, normal_weight * own], 1)
+    target_features = np.concatenate([target, normal_weight * normals], 1)
+    to_target, target_index = cKDTree(target_features).query(moved_features)
+    to_moved, moved_index = cKDTree(moved_features).query(target_features)
+    return to_target, target_index, to_moved, moved_index
 
 
 def _squared_distances(points: Array) -> Array:

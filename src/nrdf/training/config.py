@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from nrdf.errors import ConfigError
-
-
-class Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from nrdf.strict import Strict, explain, nearest
 
 
 class AugmentConfig(Strict):
@@ -56,10 +52,10 @@ class DataConfig(Strict):
     surface_points: int = Field(default=8192, ge=1)
     """Surface points a shape kept in memory to draw from."""
     stored_queries: int = Field(default=20000, ge=1)
-    pools: dict[str, float] = {}
+    pools: dict[str, float] = Field(default={})
     """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
     within a pool. Empty: one pool of all shapes."""
-    exact_groups: list[str] = ["family-*", "shared-*"]
+    exact_groups: list[str] = Field(default=["family-*", "shared-*"])
     """Patterns of correspondence groups whose weight 0 is a fact ("no such place"), not a doubt."""
     weight_threshold: float = Field(default=0.05, ge=0, le=1)
     """Correspondences of less confidence are not drawn."""
@@ -92,7 +88,7 @@ class Stage(Strict):
 
         for name in weights:
             if name not in LOSSES:
-                raise ValueError(f"no loss '{name}'{_nearest(name, LOSSES)}")
+                raise ValueError(f"no loss '{name}'{nearest(name, LOSSES)}")
         return weights
 
     @model_validator(mode="after")
@@ -114,14 +110,14 @@ class TrainConfig(Strict):
     """One training run, except for the data folders, the category and the device."""
 
     preset: str
-    field: dict[str, Any] = {}
+    field: dict[str, Any] = Field(default={})
     """Sizes that differ from the preset's."""
     stages: list[Stage] = Field(min_length=1)
     data: DataConfig = DataConfig()
     optimizer: OptimizerConfig = OptimizerConfig()
     seed: int = Field(default=0, ge=0)
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
-    """auto: bfloat16 where it pays (CUDA; CPUs with AMX)."""
+    """auto: bfloat16 where it pays (CUDA; CPUs with AMX or AVX-512 BF16)."""
     ema: float | None = Field(default=None, gt=0, lt=1)
     """Decay of the moving average of the weights, which is what is exported; None: no average."""
     checkpoint_every: int = Field(default=500, ge=1)
@@ -162,33 +158,4 @@ def _validated(content: Mapping[str, Any], origin: str) -> TrainConfig:
     try:
         return TrainConfig.model_validate(dict(content))
     except ValidationError as error:
-        lines = [_explain(dict(item)) for item in error.errors()]
-        raise ConfigError(f"{origin}: " + "; ".join(lines)) from None
-
-
-def _explain(item: dict[str, Any]) -> str:
-    """One pydantic complaint in words, with the nearest known name for an unknown key."""
-    where = ".".join(str(part) for part in item["loc"])
-    if item["type"] == "extra_forbidden":
-        return f"unknown key '{where}'{_nearest(str(item['loc'][-1]), _keys_at(item['loc'][:-1]))}"
-    return f"{where}: {item['msg'].removeprefix('Value error, ')}"
-
-
-def _keys_at(location: tuple[Any, ...]) -> list[str]:
-    """The keys that are known at a place in the configuration."""
-    places: dict[str, type[BaseModel]] = {
-        "stages": Stage,
-        "data": DataConfig,
-        "augment": AugmentConfig,
-        "optimizer": OptimizerConfig,
-    }
-    names = [part for part in location if isinstance(part, str) and part in places]
-    model = places[names[-1]] if names else TrainConfig
-    return list(model.model_fields)
-
-
-def _nearest(name: str, known: Any) -> str:
-    names = list(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    hint = f"; did you mean '{close[0]}'?" if close else ""
-    return f"{hint} (known: {', '.join(names)})"
+        raise ConfigError(f"{origin}: " + "; ".join(explain(error, TrainConfig))) from None

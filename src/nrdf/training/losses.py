@@ -21,6 +21,7 @@ from nrdf.training.data import Batch
 from nrdf.training.matching import (
     assign,
     distances,
+    distances_to,
     gather,
     local_normals,
     nearest_distance,
@@ -122,8 +123,7 @@ def roughness(f: Forward, values: Tensor) -> Tensor:
         min(17, c), dim=2, largest=False, sorted=True
     )
     apart, around = apart[:, :, 1:], around[:, :, 1:]
-    difference = values[:, rows, None] - gather(values, around)
-    return weighted_mean((difference.square().sum(-1) + 1e-12).sqrt(), (apart < 0.1).float())
+    return weighted_mean(distances_to(values, rows, around), (apart < 0.1).float())
 
 
 def occupancy(f: Forward) -> Tensor:

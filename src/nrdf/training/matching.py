@@ -69,6 +69,21 @@ def nearest_distance(query: Tensor, reference: Tensor, squared: bool = False) ->
     return square if squared else (square + 1e-12).sqrt()
 
 
+def distances_to(values: Tensor, rows: Tensor, others: Tensor) -> Tensor:
+    """Distances (b, r, k) from values (b, c, d) at `rows` (r,) to those at `others` (b, r, k).
+
+    By products of all pairs, |x|² + |y|² − 2 x·y in float32, about the mean: gathering the others'
+    values would take k·d numbers a row, which for descriptors is most of a training step.
+    """
+    values = values.float()
+    values = values - values.mean(dim=1, keepdim=True)
+    with torch.autocast(values.device.type, enabled=False):
+        norms = values.square().sum(-1)
+        product = values[:, rows] @ values.transpose(1, 2)
+        square = norms[:, rows, None] + norms[:, None] - 2 * product
+    return (square.gather(2, others).clamp_min(0) + 1e-12).sqrt()
+
+
 def local_normals(points: Tensor, neighbours: int = 16, towards: Tensor | None = None) -> Tensor:
     """Unit normals (b, n, 3) of points (b, n, 3) from the plane through their neighbours.
 

@@ -1,0 +1,22 @@
+"""Take what is done on one chair to another: tool paths, measured. Writes the folder job/.
+
+python examples/05_transfer_a_process.py
+"""
+
+import nrdf
+from nrdf.bundled import KNOWLEDGE, bundled_chair
+
+teacher = nrdf.teach(KNOWLEDGE)  # chair.yaml: five regions of a reference, a process on each
+target, _ = bundled_chair("rocker")  # PointCloud, 8192 points in metres
+
+job = teacher.transfer(target)  # finds the regions, plans or carries the tool paths
+for step in job.paths:  # in the order in which they are driven
+    if step.path is None:
+        print(f"{step.region:11s} {step.process.label:15s} left out: {step.reason}")
+    else:
+        # step.path.segments: positions (n, 3) in metres, quaternions_xyzw (n, 4), feed, force
+        print(
+            f"{step.region:11s} {step.process.label:15s} {len(step.path.segments):4d} segments, "
+            f"{step.measures.coverage:.1%} covered, {step.measures.cycle_time_s:.0f} s"
+        )
+job.write("job", overwrite=True)  # what `nrdf transfer` writes; next: nrdf export job --format ...

@@ -1,0 +1,50 @@
+"""`nrdf export`: the tool paths of a job as files for robots, machine tools and CAM."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from nrdf.commands.console import command_line, console, show, table, write_report
+from nrdf.export.options import Options
+
+
+def export(
+    job: Positional[Path],
+    format: tuple[str, ...],
+    out: Path | None = None,
+    programs: OmitArgPrefixes[Options] = Options(),  # noqa: B008
+    overwrite: bool = False,
+) -> None:
+    """Write a job's tool paths for a robot, a machine tool or CAM.
+
+    Formats: ros2-bag, noether, apt, gcode, urscript, rapid, krl, csv, json. Each gets a folder of
+    its name in the output folder. What each carries, and how to load it: docs/export.md.
+
+    Example: nrdf export job/ --format urscript csv --out programs/
+
+    Args:
+        job: Folder that `nrdf transfer` wrote, with toolpaths.json in it.
+        format: One or more formats.
+        out: Folder to write; the folder export in the job's unless given.
+        programs: Choices about what is written.
+        overwrite: Replace an earlier result in the output folder.
+    """
+    from nrdf.export.registry import check_formats, export_job
+    from nrdf.output import output_folder
+    from nrdf.process.toolpath import read_job
+
+    check_formats(format)
+    content = read_job(job)
+    place = out or (job if job.is_dir() else job.parent) / "export"
+    with output_folder(place, overwrite) as folder:
+        files = export_job(content, format, folder, programs)
+        report = {"command": command_line(), "job": str(job), "options": asdict(programs)}
+        write_report(folder, {**report, "formats": files})
+    shown = table("", "format", "")
+    for name, written in files.items():
+        shown.add_row(name, ", ".join(written))
+    show(shown)
+    console.print(f"{len(content.paths)} tool paths written to {place}")

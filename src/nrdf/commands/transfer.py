@@ -1,0 +1,123 @@
+"""`nrdf transfer`: process knowledge, taken from the object it was taught on to a new one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from tyro.conf import Positional
+
+from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
+
+
+def transfer(
+    knowledge: Positional[Path],
+    target: Path,
+    out: Path,
+    model: str | None = None,
+    unit: Literal["m", "cm", "mm", "in"] | None = None,
+    min_confidence: float | None = None,
+    min_coverage: float | None = None,
+    max_line_spacing_mm: float | None = None,
+    max_surface_distance_mm: float | None = None,
+    max_axis_error_deg: float | None = None,
+    max_cycle_time_s: float | None = None,
+    require_all: bool = False,
+    device: str = "cpu",
+    overwrite: bool = False,
+) -> None:
+    """Bring process knowledge to a new object, as tool paths.
+
+    Writes into the output folder: knowledge.yaml (the same format, for the new object),
+    target.ply and regions/ (in metres), toolpaths.json (for `nrdf export`), report.json,
+    report.html (opens without a network) and picture.png. A region that the new object lacks is
+    reported and skipped. A limit that is set and not met ends with exit code 3, after writing.
+
+    Example: nrdf transfer chair.yaml --target new.ply --out job/ --min-coverage 0.98
+
+    Args:
+        knowledge: Knowledge file, as `nrdf knowledge new` begins it.
+        target: Cloud or mesh of the new object: +X forward, +Y up.
+        out: Folder to write; made if missing.
+        model: Zoo name, weight file or run; the category's model in the zoo unless given.
+        unit: Of the target's file, where it does not say: m, cm, mm or in.
+        min_confidence: Regions found with less mean confidence are taken to be absent (0.3).
+        min_coverage: Limit on the share of each region that its tool reaches, 0 to 1.
+        max_line_spacing_mm: Limit on the distance between neighbouring lines.
+        max_surface_distance_mm: Limit on the waypoints' distance from the surface.
+        max_axis_error_deg: Limit on the tool axis' error, of 99 % of the waypoints.
+        max_cycle_time_s: Limit on the time of all tool paths together.
+        require_all: Limit: every process of every region must have a tool path.
+        device: cpu, cuda, cuda:N or auto.
+        overwrite: Replace an earlier result in the output folder.
+    """
+    import math
+
+    from nrdf.errors import LimitError
+    from nrdf.output import output_folder
+    from nrdf.process.limits import Limits
+
+    limits = Limits(
+        min_coverage=min_coverage,
+        max_line_spacing_m=_scaled(max_line_spacing_mm, 1e-3),
+        max_surface_distance_m=_scaled(max_surface_distance_mm, 1e-3),
+        max_axis_error_rad=_scaled(max_axis_error_deg, math.pi / 180),
+        max_cycle_time_s=max_cycle_time_s,
+        require_all=require_all,
+    )
+    with output_folder(out, overwrite) as folder:
+        import nrdf
+        from nrdf.process.job_folder import write_transfer
+        from nrdf.process.lesson import known_unit, read_lesson
+        from nrdf.process.transfer import MIN_CONFIDENCE, Teacher
+
+        lesson = read_lesson(knowledge)
+        category = lesson.knowledge.category
+        cloud = nrdf.read_cloud(target)
+        known = known_unit(cloud, unit, category, str(target), "--unit")
+        loaded = nrdf.load_model(model or category, device)
+        with errors.status("reference"):
+            teacher = Teacher(lesson, loaded)
+        with errors.status("regions and tool paths"):
+            least = MIN_CONFIDENCE if min_confidence is None else min_confidence
+            transferred = teacher.transfer(cloud, known, least)
+        origin = {
+            "command": command_line(),
+            "knowledge": str(knowledge),
+            "target": str(target),
+            "model": provenance(loaded.metadata),
+            "versions": versions(),
+        }
+        with errors.status("report"):
+            report = write_transfer(folder, transferred, limits, target.name, origin)
+    show_transfer(report)
+    console.print(f"{_summary(report)}; all in {out}")
+    broken = report["limits"]["not_met"]
+    if broken:
+        raise LimitError("limits not met:\n  " + "\n  ".join(broken))
+
+
+def show_transfer(report: dict[str, Any]) -> None:
+    """A table of a transfer's tool paths, and its warnings."""
+    from nrdf.process.report import SHORT_FIGURES, short_figures
+
+    none = ["–"] * len(SHORT_FIGURES)
+    shown = table("", "region", "process", "confidence", *SHORT_FIGURES, texts=2)
+    for path in report["paths"]:
+        confidence = f"{report['regions'][path['region']]['confidence']:.2f}"
+        cells = short_figures(path["measures"]) if path["planned"] else none
+        style = None if path["planned"] else "dim"
+        shown.add_row(path["region"], path["process"], confidence, *cells, style=style)
+    show(shown)
+    for warning in report["warnings"]:
+        errors.print(warning, style="yellow")
+
+
+def _summary(report: dict[str, Any]) -> str:
+    total = report["total"]
+    minutes, seconds = divmod(round(total["cycle_time_s"]), 60)
+    return f"{total['paths']} tool paths, {minutes} min {seconds} s"
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor

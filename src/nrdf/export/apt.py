@@ -1,0 +1,78 @@
+"""APT source / CLDATA (ISO 4343): GOTO with tool axis, for post-processors and CAM."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from nrdf.export.header import (
+    commented,
+    header,
+    path_title,
+    revolutions_per_minute,
+    save,
+    segment_title,
+)
+from nrdf.export.names import number, numbers, program_name
+from nrdf.export.options import Options
+from nrdf.export.prepare import prepare, strokes, tool_numbers
+from nrdf.export.rotation import tool_axes
+from nrdf.process.toolpath import Job, ToolPath
+
+_WIDTH = 72
+_CARRIED = (
+    "Contact force is not carried: it stands in PPRINT lines. Nor is the tool's turn about its "
+    "own axis. Spindle, feed and dwell are."
+)
+
+
+def write(job: Job, options: Options, folder: Path) -> None:
+    """Write PROGRAM.apt."""
+    job = prepare(job, options, "into")
+    name = program_name(job, options, 24, "the file system")
+    axis = "i j k, the tool's axis from its tip to its holder, out of the part."
+    said = header(job, options, "Lengths in mm, feed in mm/min, DELAY in s.", axis, _CARRIED)
+    lines = [f"PARTNO/{name.upper()}", *commented(said, "$$ ", width=_WIDTH)]
+    lines += ["UNITS/MM", "MULTAX/ON"]
+    numbers_of = tool_numbers(job, options)
+    loaded = None
+    for i, path in enumerate(job.paths, start=1):
+        lines += commented([path_title(path, i).upper()], "PPRINT/", width=_WIDTH)
+        if path.tool != loaded:
+            lines.append(f"LOADTL/{numbers_of[path.tool]}")
+            loaded = path.tool
+        lines.append(f"CUTTER/{number(2000 * path.tool_radius_m, 4)}")
+        lines += _path(path)
+    save(folder / f"{name}.apt", [*lines, "END", "FINI"])
+
+
+def _path(path: ToolPath) -> list[str]:
+    lines = []
+    if path.spindle_rad_s is not None:
+        rpm = number(revolutions_per_minute(path.spindle_rad_s), 2)
+        lines.append(f"SPINDL/{rpm},RPM,CLW")
+    arriving = True
+    for index, stroke in enumerate(strokes(path, 0.0), start=1):
+        segment = stroke.segment
+        lines += commented([segment_title(segment, index).upper()], "PPRINT/", width=_WIDTH)
+        gotos = _gotos(stroke.positions, stroke.quaternions_xyzw)
+        if arriving and gotos:
+            lines += ["RAPID", *gotos.pop(0)]
+            arriving = False
+        lines.append(f"FEDRAT/{number(60000 * segment.feed_m_s, 3)},MMPM")
+        lines += [line for goto in gotos for line in goto]
+        if segment.dwell_s:
+            lines.append(f"DELAY/{number(segment.dwell_s, 3)}")
+    return [*lines, "SPINDL/OFF"] if path.spindle_rad_s is not None else lines
+
+
+def _gotos(positions: np.ndarray, quaternions_xyzw: np.ndarray) -> list[list[str]]:
+    """A GOTO for each waypoint, continued with $ on a second line to keep to 72 columns."""
+    if len(positions) == 0:
+        return []
+    made = []
+    for position, axis in zip(1000 * positions, tool_axes(quaternions_xyzw), strict=True):
+        point, direction = ",".join(numbers(position, 5)), ",".join(numbers(axis, 9))
+        made.append([f"GOTO/{point},$", direction])
+    return made

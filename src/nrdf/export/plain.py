@@ -1,0 +1,81 @@
+"""JSON that says all there is, for programs of one's own."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from nrdf.export.header import header, save, tool_z_words
+from nrdf.export.names import program_name
+from nrdf.export.options import Options
+from nrdf.export.prepare import prepare
+from nrdf.process.toolpath import Job
+
+VERSION = 1
+_CARRIED = (
+    "force_n null: no contact. spindle_rad_s null: nothing turns. dwell_s: after the segment's "
+    "last waypoint."
+)
+WAYPOINT = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
+
+
+def write(job: Job, options: Options, folder: Path) -> None:
+    """Write PROGRAM.json."""
+    job = prepare(job, options, "into")
+    name = program_name(job, options, 64, "the file system")
+    text = json.dumps(describe(job, options), indent=1, allow_nan=False)
+    # A waypoint a line, not a number a line.
+    text = re.sub(r"\[\n([-\d.e+,\s]+)\]", _on_one_line, text)
+    save(folder / f"{name}.json", text.splitlines())
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    return "[" + " ".join(found[1].split()) + "]"
+
+
+def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, Any]:
+    """All of a prepared `job` as JSON has it, the waypoints themselves if wanted."""
+    turned = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
+    conventions = header(job, options, "SI units.", turned, _CARRIED)
+    paths = []
+    for path in job.paths:
+        segments = []
+        for segment in path.segments:
+            poses = zip(segment.positions, segment.quaternions_xyzw, strict=True)
+            segments.append(
+                {
+                    "kind": segment.kind,
+                    "line": segment.line,
+                    "feed_m_s": float(segment.feed_m_s),
+                    "force_n": segment.force_n,
+                    "dwell_s": segment.dwell_s,
+                    "waypoints": [[*p.tolist(), *q.tolist()] for p, q in poses]
+                    if waypoints
+                    else len(segment.positions),
+                }
+            )
+        optional = ("tcp_m", "tcp_quaternion_xyzw", "force_tolerance_n")
+        known = {n: getattr(path, n) for n in optional if getattr(path, n) is not None}
+        paths.append(
+            {
+                "region": path.region,
+                "process": path.process,
+                "tool": path.tool,
+                "tool_radius_m": float(path.tool_radius_m),
+                "spindle_rad_s": path.spindle_rad_s,
+                "parameters": path.parameters,
+                **known,
+                "segments": segments,
+            }
+        )
+    return {
+        "format": "nrdf tool paths",
+        "version": VERSION,
+        "conventions": conventions,
+        "category": job.category,
+        "frame": job.frame,
+        "waypoint": list(WAYPOINT),
+        "paths": paths,
+    }

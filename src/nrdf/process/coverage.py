@@ -1,0 +1,259 @@
+"""How well a tool path works its region: the figures of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from nrdf.errors import ProcessError
+from nrdf.process.border import OWN
+from nrdf.process.frames import lean_rotation, tool_quaternions, travel_of
+from nrdf.process.patch import Patch, patches_of
+from nrdf.process.plan import Strategy
+from nrdf.process.surface import Surface
+from nrdf.process.toolpath import Segment
+
+_FACING = 0.2
+"""Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Figures of one tool path on one region.
+
+    coverage: share [0, 1] of the region's area inside its margin that the footprint reaches;
+    overlap: share of what is reached that it reaches more than once in a pass;
+    line_spacing_*: between neighbouring lines, along the surface; None where no line has a
+    neighbour. surface_distance_*: of the process waypoints from the local smooth surface at the
+    stand-off asked for, the worst and the 99th percentile; axis_error_99_rad: 99th percentile of
+    the angle between the tool's axis and the one asked for. process_length_m: of the process
+    segments; path_length_m: of all, free moves between them included; cycle_time_s: at the feeds
+    given, dwells included.
+    """
+
+    coverage: float
+    overlap: float
+    line_spacing_mean_m: float | None
+    line_spacing_worst_m: float | None
+    surface_distance_worst_m: float
+    surface_distance_99_m: float
+    axis_error_99_rad: float
+    path_length_m: float
+    process_length_m: float
+    cycle_time_s: float
+
+
+def measure(
+    surface: Surface, region: np.ndarray, strategy: Strategy, segments: Sequence[Segment]
+) -> Measures:
+    """Figures of `segments` on `region`, indices (k,) of the surface's points.
+
+    The region's points, each of which stands for the same area, tell what is covered. Raises
+    ProcessError if there is no process segment.
+    """
+    work = [segment for segment in segments if segment.kind == "process"]
+    if not work:
+        raise ProcessError("a tool path without a process segment cannot be measured")
+    patches = patches_of(surface, region)
+    axes = [_axes(segment) for segment in work]
+    contacts = [
+        s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
+    ]
+    once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
+    track = _Track.along(contacts[:once], axes[:once], strategy.tool_radius_m / 4.0)
+    inside = _inside(surface, region, patches, strategy.edge_margin_m)
+    visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
+    spacing = _line_spacing(patches, track, strategy.stepover_m)
+    everywhere = np.concatenate(contacts)
+    held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
+    upright = held * lean_rotation(strategy.lead_rad, strategy.tilt_rad).inv()
+    tails = -upright.as_matrix()[:, :, 2]
+    off = _off_surface(surface, everywhere, tails)
+    smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    wrong = np.concatenate(
+        [
+            _axis_error(line, normals, turned, strategy)
+            for line, normals, turned in zip(contacts, np.split(smooth, cuts), axes, strict=True)
+        ]
+    )
+    process, between, time = _driven(segments, strategy.approach_feed_m_s)
+    return Measures(
+        coverage=float((visits > 0).mean()) if len(visits) else 0.0,
+        overlap=float((visits[visits > 0] > 1).mean()) if (visits > 0).any() else 0.0,
+        line_spacing_mean_m=float(spacing.mean()) if len(spacing) else None,
+        line_spacing_worst_m=float(spacing.max()) if len(spacing) else None,
+        surface_distance_worst_m=float(off.max()),
+        surface_distance_99_m=float(np.quantile(off, 0.99)),
+        axis_error_99_rad=float(np.quantile(wrong, 0.99)),
+        path_length_m=process + between,
+        process_length_m=process,
+        cycle_time_s=time,
+    )
+
+
+def _axes(segment: Segment) -> np.ndarray:
+    """Tool z (n, 3) of a segment."""
+    return Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
+
+
+def _off_surface(surface: Surface, contacts: np.ndarray, tails: np.ndarray) -> np.ndarray:
+    """Distance (n,), m, of contacts (n, 3) from the smooth surface that faces the tool.
+
+    At an edge it has more than one sheet, each found from a normal of its own; the nearest counts.
+    """
+    near = surface.tree.query(contacts, min(4, len(surface.points)))[1]
+    off = np.full(len(contacts), np.inf)
+    for normals in (tails, *np.moveaxis(surface.normals[near], 1, 0)):
+        facing = np.einsum("na,na->n", normals, tails) > _FACING
+        found = surface.project(contacts[facing], normals[facing])[0]
+        off[facing] = np.minimum(off[facing], np.linalg.norm(found - contacts[facing], axis=1))
+    return off
+
+
+def _axis_error(
+    contacts: np.ndarray, normals: np.ndarray, axes: np.ndarray, strategy: Strategy
+) -> np.ndarray:
+    """Angle (n,), rad, between tool z and what the strategy asks for on smooth normals (n, 3)."""
+    # One waypoint has no travel; on a tool that does not lean it would not matter.
+    travel = travel_of(contacts, 0.5 * strategy.stepover_m) if len(contacts) > 1 else axes
+    asked = tool_quaternions(travel, normals, strategy.lead_rad, strategy.tilt_rad)
+    cosine = np.einsum("na,na->n", Rotation.from_quat(asked).as_matrix()[:, :, 2], axes)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float, float]:
+    """Length of process segments, length of everything else, time of all."""
+    process, between, time = 0.0, 0.0, 0.0
+    end = None
+    for segment in segments:
+        if end is not None:
+            free = float(np.linalg.norm(segment.positions[0] - end))
+            between, time = between + free, time + free / free_feed
+        length = float(np.linalg.norm(np.diff(segment.positions, axis=0), axis=1).sum())
+        time += length / segment.feed_m_s + segment.dwell_s
+        if segment.kind == "process":
+            process += length
+        else:
+            between += length
+        end = segment.positions[-1]
+    return process, between, time
+
+
+def _inside(
+    surface: Surface, region: np.ndarray, patches: Sequence[Patch], margin: float
+) -> np.ndarray:
+    """Indices of the region's points that are not in the margin along its border."""
+    inside = np.zeros(len(surface.points), bool)
+    inside[surface.indices(region)] = True
+    if margin > 0.0:
+        for patch in patches:
+            own = patch.label == OWN
+            inside[patch.index[own]] = patch.border.distance(patch.uv[own]) >= margin
+    return np.flatnonzero(inside)
+
+
+@dataclass(frozen=True)
+class _Track:
+    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3); walked (n,), m,
+    from the start, with a long step from line to line."""
+
+    places: np.ndarray
+    axes: np.ndarray
+    travel: np.ndarray
+    walked: np.ndarray
+    step: float
+
+    @staticmethod
+    def along(contacts: list[np.ndarray], axes: list[np.ndarray], step: float) -> _Track:
+        places, turned, travel, walked = [], [], [], []
+        far = 0.0
+        for line, axis in zip(contacts, axes, strict=True):
+            way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+            at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / step)), 1) + 1)
+            fine = np.stack([np.interp(at, way, line[:, k]) for k in range(3)], axis=1)
+            places.append(fine)
+            turned.append(np.stack([np.interp(at, way, axis[:, k]) for k in range(3)], axis=1))
+            travel.append(travel_of(fine) if len(line) > 1 else np.zeros_like(fine))
+            walked.append(far + at)
+            far += way[-1] + 1e3
+        return _Track(*map(np.concatenate, (places, turned, travel, walked)), step)
+
+    def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
+        """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
+        if not len(points):
+            return np.zeros(0, int)
+        pairs = cKDTree(points).sparse_distance_matrix(
+            cKDTree(self.places), radius, output_type="ndarray"
+        )
+        point, place = pairs["i"], pairs["j"]
+        facing = -np.einsum("pa,pa->p", normals[point], self.axes[place]) > _FACING
+        point, place = point[facing], place[facing]
+        order = np.lexsort((place, point))
+        point, way = point[order], self.walked[place[order]]
+        new = np.ones(len(point), bool)
+        new[1:] = (point[1:] != point[:-1]) | (np.diff(way) > 2.5 * self.step)
+        return np.bincount(point[new], minlength=len(points))
+
+
+def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> np.ndarray:
+    """Distances (k,), m, along the surface, from places of lines to the next lines beside them.
+
+    The nearest line to either side counts if the region goes on all the way to it, within one
+    patch. Places are compared in the patch's plane, and measured with its metric.
+    """
+    owner, point, uv = _located(patches, track)
+    found = [np.zeros(0)]
+    for number, patch in enumerate(patches):
+        mine = np.flatnonzero(owner == number)
+        if not len(mine):
+            continue
+        place, walked = uv[mine], track.walked[mine]
+        travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
+        gap = np.abs(np.diff(walked, prepend=-np.inf, append=np.inf)) > 2.0 * track.step
+        end = gap[1:] | gap[:-1]
+        tree = cKDTree(place)
+        pairs = tree.sparse_distance_matrix(tree, 2.5 * stepover, output_type="ndarray")
+        i, j, away = pairs["i"], pairs["j"], pairs["v"]
+        offset = place[j] - place[i]
+        beside = travel[i, 0] * offset[:, 1] - travel[i, 1] * offset[:, 0]
+        other = np.abs(walked[i] - walked[j]) > np.minimum(3.0 * away, 2.5 * stepover)
+        kept = other & (np.abs(beside) > 0.5 * away) & (away > 1e-9)
+        i, j, key = i[kept], j[kept], (2 * i + (beside > 0.0))[kept]
+        order = np.lexsort((away[kept], key))
+        _, first = np.unique(key[order], return_index=True)
+        i, j = i[order][first], j[order][first]
+        whole = ~end[j]  # what goes on past a line's end is not beside it
+        for share in (0.25, 0.5, 0.75):
+            whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
+        i, j = i[whole], j[whole]
+        metric = 0.5 * (patch.metric[point[mine[i]]] + patch.metric[point[mine[j]]])
+        offset = place[j] - place[i]
+        found.append(np.sqrt(np.einsum("pa,pab,pb->p", offset, metric, offset)))
+    return np.concatenate(found)
+
+
+def _located(patches: Sequence[Patch], track: _Track) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The patch (n,) that each place of a track is on, the patch's point (n,) nearest to it, and
+    its uv (n, 2) there."""
+    best = np.full(len(track.places), np.inf)
+    owner, point = np.full(len(best), -1), np.zeros(len(best), int)
+    uv = np.zeros((len(best), 2))
+    for number, patch in enumerate(patches):
+        own = np.flatnonzero(patch.label == OWN)
+        distance, near = cKDTree(patch.points[own]).query(track.places)
+        near = own[near]
+        outward = np.cross(patch.tangents[near, 0], patch.tangents[near, 1])
+        # A place over the other side of a thin part is as good as far away.
+        distance += 1e3 * (np.einsum("na,na->n", outward, track.axes) > -_FACING)
+        offset = np.einsum("nba,na->nb", patch.tangents[near], track.places - patch.points[near])
+        closer = distance < best
+        best = np.where(closer, distance, best)
+        owner = np.where(closer, number, owner)
+        point = np.where(closer, near, point)
+        uv = np.where(closer[:, None], patch.uv[near] + offset, uv)
+    return owner, point, uv

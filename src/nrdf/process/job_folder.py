@@ -1,0 +1,110 @@
+"""A transfer as a folder: the knowledge for the new object, its tool paths, report and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.cloud import write_cloud
+from nrdf.output import REPORT, write_json
+from nrdf.picture import Panel, draw_regions
+from nrdf.process.knowledge import Knowledge, Reference, Region
+from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.lesson import checksum, overlaps
+from nrdf.process.limits import Limits
+from nrdf.process.page import write_page
+from nrdf.process.report import report_of
+from nrdf.process.toolpath import Job, write_job
+from nrdf.process.transfer import Transferred, touched
+from nrdf.regions.files import write_matches
+
+KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
+PAGE, PICTURE = "report.html", "picture.png"
+
+
+def write_transfer(
+    folder: Path,
+    transferred: Transferred,
+    limits: Limits,
+    title: str,
+    origin: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Write a transfer into an existing folder; what its report.json says.
+
+    knowledge.yaml, target.ply (in metres, in the target's own frame), regions/, toolpaths.json
+    (for `nrdf export`), report.json, report.html and picture.png. `title` names the target,
+    `origin` (command, model, versions, ...) is added to the report. Without any tool path there is
+    neither knowledge.yaml nor toolpaths.json. Raises OutputError if something cannot be written.
+    """
+    target = transferred.target
+    write_cloud(folder / TARGET, target)
+    (folder / REGIONS).mkdir()
+    found = {n: r.match for n, r in transferred.regions.items() if not r.missing}
+    write_matches(folder / REGIONS, target, found)
+    job = job_of(transferred)
+    if job.paths:
+        write_job(folder, job)
+        write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
+    panel = panel_of(transferred, title)
+    draw_regions([panel], folder / PICTURE, size=540)
+    report = {"title": title, **report_of(transferred, limits), **origin}
+    report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_page(folder / PAGE, report, panel, folder / PICTURE)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    report["files"] = [*files, REPORT]
+    write_json(folder / REPORT, report)
+    return report
+
+
+def job_of(transferred: Transferred) -> Job:
+    """The tool paths of a transfer, in the order in which they are driven."""
+    return Job(
+        category=transferred.lesson.knowledge.category,
+        frame=transferred.target.frame or "target",
+        paths=tuple(step.path for step in transferred.paths if step.path is not None),
+    )
+
+
+def panel_of(transferred: Transferred, title: str, note: str = "") -> Panel:
+    """The target with its regions and the lines of its tool paths, for a picture."""
+    regions = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
+    lines: dict[str, list[np.ndarray]] = {}
+    for step in transferred.paths:
+        if step.path is not None:
+            work = [s for s in step.path.segments if s.kind == "process"]
+            height = step.process.standoff_m
+            drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
+            lines.setdefault(step.region, []).extend(drawn)
+    return Panel(title, transferred.target.points, transferred.target.normals, regions, note, lines)
+
+
+def _knowledge(transferred: Transferred, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
+    """What was taught, as it is on the target: the same format, for the same kind of use."""
+    taught = transferred.lesson.knowledge
+    regions = []
+    for region in taught.regions:
+        # In the file's order, whatever the order in which they are driven.
+        done = [
+            step.process
+            for number in range(len(region.processes))
+            for step in transferred.paths
+            if (step.region, step.number) == (region.name, number) and step.path is not None
+        ]
+        if done:
+            file = f"{REGIONS}/{region.name}.ply"
+            regions.append(Region(name=region.name, file=file, processes=done))
+    found = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
+    frame = transferred.target.frame
+    reference = Reference(cloud=TARGET, sha256=checksum(folder / TARGET), frame=frame)
+    keys = ("command", "knowledge", "target", "model", "date")
+    return Knowledge(
+        category=taught.category,
+        reference=reference,
+        allow_overlap=taught.allow_overlap or bool(overlaps(found)),
+        regions=regions,
+        origin={key: origin[key] for key in keys if key in origin},
+    )

@@ -1,0 +1,281 @@
+"""Process knowledge: on which regions of a reference object what is done, and how (paper, eq. 10).
+
+The models here are the knowledge file's format; `nrdf.process.knowledge_file` reads and writes it.
+Every quantity is SI and its name ends with its unit; a file may give millimetres, degrees and
+revolutions per minute instead (``stepover_mm``, ``tilt_deg``, ``feed_mm_s``, ``spindle_rpm``).
+Positions and directions are in the frame of the reference cloud.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from nrdf.process.quantities import (
+    Angle,
+    Direction,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Quantities,
+    Quaternion,
+    Vector,
+)
+from nrdf.regions.region import REGION_NAME
+
+VERSION: Final = 1
+Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
+Trajectory = Literal["raster", "cross-hatch", "spiral", "contour", "taught"]
+Transfer = Literal["replan", "carry"]
+WITHOUT_CONTACT = ("paint", "inspect")
+"""Kinds of process that touch nothing, so have no contact force."""
+
+
+def _region_name(text: str) -> str:
+    if not REGION_NAME.fullmatch(text):
+        raise ValueError(
+            "a region's name becomes a file name: letters, digits, spaces and any of . + - _"
+        )
+    return text
+
+
+class Tool(Quantities):
+    """What touches or faces the surface."""
+
+    name: Name = "tool"
+    """Its name, for the robot's program."""
+    radius_m: Positive
+    """Radius of its footprint on the surface."""
+    tcp_m: Vector | None = None
+    """Tool centre point in the robot's flange frame."""
+    tcp_quaternion_xyzw: Quaternion | None = None
+    """Rotation from the tool frame (z into the part) to the flange frame."""
+
+
+class FreeMove(Quantities):
+    """How a line is approached, or left."""
+
+    distance_m: NotNegative = 0.05
+    """Length of the move."""
+    angle_rad: Annotated[Number, Field(ge=0, le=math.pi / 2)] = 0.0
+    """Its angle from the surface's normal: 0 straight down, 90° along the surface."""
+    feed_m_s: Positive = 0.1
+    """Its speed."""
+
+
+class Line(Quantities):
+    """A taught line (stroke): waypoints in the order in which they are driven."""
+
+    positions_m: list[Vector] = Field(min_length=1)
+    """Tool centre points in the reference's frame."""
+    quaternions_xyzw: list[Quaternion] | None = None
+    """Rotation from the tool frame (z into the part, x along the travel) to the reference's frame,
+    one a waypoint; without them the tool follows the surface, lead and tilt."""
+
+    @model_validator(mode="after")
+    def _one_each(self) -> Line:
+        given = self.quaternions_xyzw
+        if given is not None and len(given) != len(self.positions_m):
+            raise ValueError(
+                f"{len(given)} quaternions_xyzw do not fit {len(self.positions_m)} positions_m; "
+                "give one a waypoint"
+            )
+        return self
+
+
+class Process(Quantities):
+    """One thing that is done to a region, with its parameters."""
+
+    kind: Kind
+    """sand, polish, oil, paint, clean, inspect or custom."""
+    name: Name | None = None
+    """What people call it ("sand, 120 grit"); needed where kind is custom."""
+    order: int = 0
+    """Lower numbers first, over all regions; equal ones as they stand in the file."""
+    transfer: Transfer | None = None
+    """replan: plan the strategy anew on the new object; carry: take every waypoint over.
+    Unless given, carry where the trajectory is taught, else replan."""
+    trajectory: Trajectory = "raster"
+    """raster, cross-hatch, spiral, contour, or taught with its own waypoints."""
+    direction: Direction | None = None
+    """Along the lines of a raster, in the reference's frame; unless given, the longest way."""
+    stepover_m: Positive | None = None
+    """Distance between neighbouring lines, along the surface."""
+    overlap: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    """Instead of the stepover: share of the footprint that neighbouring lines have in common."""
+    spacing_m: Positive = 0.01
+    """Distance between waypoints along a line."""
+    edge_margin_m: NotNegative = 0.0
+    """Kept free inside the region's border."""
+    passes: Annotated[int, Field(ge=1, le=1000)] = 1
+    """How often the region is worked."""
+    tool: Tool
+    """The tool."""
+    lead_rad: Angle = 0.0
+    """The tool axis leans by this against the normal, its tail towards where it travels."""
+    tilt_rad: Angle = 0.0
+    """The tool axis leans by this sideways."""
+    standoff_m: NotNegative = 0.0
+    """Height of the tool centre point over the surface; 0 where the tool touches it."""
+    force_n: Positive | None = None
+    """Contact force along the tool axis; leave it out where nothing is touched."""
+    force_tolerance_n: Positive | None = None
+    """How far the force may be off."""
+    feed_m_s: Positive
+    """Speed of the tool centre point along the lines."""
+    spindle_rad_s: NotNegative | None = None
+    """Speed of the spindle."""
+    dwell_s: NotNegative = 0.0
+    """Pause at the end of each line."""
+    approach: FreeMove = FreeMove()
+    """The free move to a line."""
+    retract: FreeMove = FreeMove()
+    """The free move away from a line."""
+    waypoints: list[Line] | None = None
+    """The lines of a taught trajectory."""
+    parameters: dict[str, Any] = Field(default={})
+    """Anything else that the process needs, passed on as it is."""
+
+    @property
+    def label(self) -> str:
+        """The process's own name, or its kind."""
+        return self.name or self.kind
+
+    @property
+    def way(self) -> Transfer:
+        """How it goes to a new object."""
+        return self.transfer or ("carry" if self.trajectory == "taught" else "replan")
+
+    @property
+    def distance_between_lines_m(self) -> float:
+        """The stepover, given or from the overlap; the tool's radius for taught lines."""
+        if self.stepover_m is not None:
+            return self.stepover_m
+        return 2 * self.tool.radius_m * (1 - (0.5 if self.overlap is None else self.overlap))
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Process:
+        if self.kind == "custom" and self.name is None:
+            raise ValueError("kind is custom: give a name that says what is done")
+        if self.stepover_m is not None and self.overlap is not None:
+            raise ValueError("give stepover_m or overlap, not both")
+        if self.trajectory == "taught":
+            self._taught_makes_sense()
+        elif self.waypoints is not None:
+            raise ValueError(f"waypoints need trajectory: taught, not {self.trajectory}")
+        elif self.stepover_m is None and self.overlap is None:
+            raise ValueError(f"a {self.trajectory} needs stepover_m or overlap")
+        if self.force_n is not None:
+            self._contact_makes_sense(self.force_n)
+        elif self.force_tolerance_n is not None:
+            raise ValueError("force_tolerance_n needs force_n")
+        return self
+
+    def _taught_makes_sense(self) -> None:
+        if not self.waypoints:
+            raise ValueError("trajectory is taught: give its waypoints, a list of lines")
+        if self.transfer == "replan":
+            raise ValueError(
+                "transfer: replan needs a strategy to plan, but trajectory is taught; "
+                "use transfer: carry"
+            )
+
+    def _contact_makes_sense(self, force_n: float) -> None:
+        if self.kind in WITHOUT_CONTACT:
+            raise ValueError(
+                f"a force without contact: force_n is {force_n:g}, but kind {self.kind} touches "
+                "nothing; remove force_n, or use kind: custom"
+            )
+        if self.standoff_m > 0:
+            raise ValueError(
+                f"a force without contact: force_n is {force_n:g}, but standoff_m is "
+                f"{self.standoff_m:g}; set standoff_m to 0, or remove force_n"
+            )
+        if self.force_tolerance_n is not None and self.force_tolerance_n >= force_n:
+            raise ValueError(
+                f"force_tolerance_n is {self.force_tolerance_n:g}; it must be below force_n, "
+                f"{force_n:g}, or contact may be lost"
+            )
+
+
+class Region(Quantities):
+    """A region of the reference, given in one of four ways, and what is done to it."""
+
+    name: Annotated[Name, Field(max_length=100), AfterValidator(_region_name)]
+    """Its name."""
+    file: str | None = None
+    """Cloud of points that lie on the reference, or .npy, .npz of a mask, indices or points; from
+    the knowledge file's folder; an .npz of several regions has this one under its name."""
+    mask: list[bool] | None = None
+    """For each point of the reference whether it belongs to the region."""
+    indices: list[Annotated[int, Field(ge=0)]] | None = None
+    """Which points of the reference belong to it, counted from 0."""
+    points_m: list[Vector] | None = None
+    """Points that lie on the reference, in its frame."""
+    processes: list[Process] = Field(min_length=1)
+    """What is done to it, one after another."""
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Region:
+        ways = ("file", "mask", "indices", "points_m")
+        given = [way for way in ways if getattr(self, way) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"give exactly one of {', '.join(ways)}; given: {', '.join(given) or 'none'}"
+            )
+        return self
+
+
+class Reference(Quantities):
+    """The object that the process was taught on: a file, or its points."""
+
+    cloud: str | None = None
+    """Cloud or mesh; from the knowledge file's folder."""
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+    """Checksum of that file: regions are only right on the cloud that they were taught on."""
+    unit: Literal["m", "cm", "mm", "in"] | None = None
+    """Unit of the cloud's file, where it does not say."""
+    frame: Name | None = None
+    """Name of the cloud's coordinate frame, where its file does not say."""
+    points_m: list[Vector] | None = None
+    """Instead of a file: the points themselves."""
+    normals: list[Vector] | None = None
+    """Outward unit normals of these points."""
+
+    @model_validator(mode="after")
+    def _given_once(self) -> Reference:
+        if (self.cloud is None) == (self.points_m is None):
+            raise ValueError("give either cloud (a file) or points_m")
+        if self.points_m is not None and (self.sha256 or self.unit not in (None, "m")):
+            raise ValueError("sha256 and unit belong to a cloud's file; points_m is in metres")
+        if self.normals is not None and len(self.normals) != len(self.points_m or ()):
+            raise ValueError("normals need points_m, one each")
+        return self
+
+
+class Knowledge(Quantities):
+    """What was taught on one object, to be carried to others of its category."""
+
+    version: Literal[1] = VERSION
+    """Version of this format."""
+    category: Name
+    """What the object is: chair, car, plane, or what the model was trained on."""
+    reference: Reference
+    """The object that it was taught on."""
+    allow_overlap: bool = False
+    """Whether regions may have points in common."""
+    regions: list[Region] = Field(min_length=1)
+    """The process regions of interest (P-ROIs)."""
+    origin: dict[str, Any] = Field(default={})
+    """Where it comes from; written by transfer."""
+
+    @model_validator(mode="after")
+    def _distinct_names(self) -> Knowledge:
+        names = [region.name for region in self.regions]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two regions are called '{twice}'; rename one")
+        return self

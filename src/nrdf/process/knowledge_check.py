@@ -1,0 +1,77 @@
+"""Whether knowledge fits its reference: every process is planned there, as it will be elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.geometry import estimate_normals
+from nrdf.process.coverage import Measures, measure
+from nrdf.process.knowledge import Process
+from nrdf.process.lesson import Lesson
+from nrdf.process.plan import drive, plan
+from nrdf.process.report import measure_warnings
+from nrdf.process.strategy import strategy_of
+from nrdf.process.surface import Surface
+from nrdf.process.taught import normals_under, taught_lines
+from nrdf.units import in_words
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A process on its region of the reference. fault: why it cannot be done, or ""; warnings:
+    what to look at; measures: None where it cannot be done."""
+
+    region: str
+    points: int
+    process: Process
+    fault: str = ""
+    warnings: tuple[str, ...] = ()
+    measures: Measures | None = None
+
+    @property
+    def where(self) -> str:
+        """The region and the process, for a message."""
+        return f"region '{self.region}', {self.process.label}"
+
+
+def check(lesson: Lesson, progress: Callable[[int, int], None] | None = None) -> list[Checked]:
+    """Plan and measure every process on the reference; `progress` is told (done, all)."""
+    cloud = lesson.cloud
+    normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
+    surface = Surface(cloud.points, normals)
+    steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.processes]
+    checked = []
+    for done, (name, process) in enumerate(steps, 1):
+        checked.append(_checked(surface, name, lesson.regions[name], process))
+        if progress is not None:
+            progress(done, len(steps))
+    return checked
+
+
+def _checked(surface: Surface, name: str, region: np.ndarray, process: Process) -> Checked:
+    warnings = []
+    stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
+    if process.trajectory != "taught" and stepover > width:
+        warnings.append(
+            f"stepover_m is {stepover:g} ({in_words('stepover_m', stepover)}), more than the "
+            f"tool's width of {in_words('width_m', width)}: stripes between the lines are left out"
+        )
+    if process.kind in ("sand", "polish") and process.force_n is None:
+        warnings.append(f"{process.kind} without force_n: the robot holds a position, not a force")
+    try:
+        strategy = strategy_of(process)
+        if process.waypoints is None:
+            segments = plan(surface, region, strategy)
+        else:
+            lines = taught_lines(process, surface)
+            drawn = [(line.positions, line.quaternions_xyzw) for line in lines]
+            segments = drive(drawn, normals_under(surface, lines), strategy)
+        measures = measure(surface, region, strategy, segments)
+    except ProcessError as error:
+        return Checked(name, len(region), process, str(error), tuple(warnings))
+    warnings += measure_warnings(process, measures)
+    return Checked(name, len(region), process, "", tuple(warnings), measures)

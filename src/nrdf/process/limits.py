@@ -1,0 +1,52 @@
+"""Limits that a user sets on a transfer, and which of them are not met."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nrdf.process.coverage import Measures
+from nrdf.process.transfer import Transferred
+from nrdf.units import in_words
+
+
+@dataclass(frozen=True)
+class Limits:
+    """None where there is no limit. SI, of each tool path; the cycle time is that of all."""
+
+    min_coverage: float | None = None
+    max_line_spacing_m: float | None = None
+    max_surface_distance_m: float | None = None
+    max_axis_error_rad: float | None = None
+    max_cycle_time_s: float | None = None
+    require_all: bool = False
+
+    def broken(self, transferred: Transferred) -> list[str]:
+        """A line for each limit that is not met: by which region and process, and by how much."""
+        lines = []
+        for step in transferred.paths:
+            where = f"region '{step.region}', {step.process.label}"
+            if step.measures is None:
+                lines += [f"{where}: there is no tool path: {step.reason}"] * self.require_all
+            else:
+                lines += [f"{where}: {what}" for what in self._broken_by(step.measures)]
+        total = sum(step.measures.cycle_time_s for step in transferred.paths if step.measures)
+        if self.max_cycle_time_s is not None and total > self.max_cycle_time_s:
+            lines.append(f"the cycle time is {total:.1f} s, above {self.max_cycle_time_s:g} s")
+        return lines
+
+    def _broken_by(self, measures: Measures) -> list[str]:
+        lines = []
+        if self.min_coverage is not None and measures.coverage < self.min_coverage:
+            lines.append(f"the coverage is {measures.coverage:.3f}, below {self.min_coverage:g}")
+        for what, name, value, limit in (
+            ("worst line spacing", "spacing_m", measures.line_spacing_worst_m,
+             self.max_line_spacing_m),
+            ("worst distance from the surface", "distance_m", measures.surface_distance_worst_m,
+             self.max_surface_distance_m),
+            ("tool axis' error (99th percentile)", "error_rad", measures.axis_error_99_rad,
+             self.max_axis_error_rad),
+        ):  # fmt: skip
+            if limit is not None and value is not None and value > limit:
+                said = f"{in_words(name, value)}, above {in_words(name, limit)}"
+                lines.append(f"the {what} is {said}")
+        return lines

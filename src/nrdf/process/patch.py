@@ -1,0 +1,212 @@
+"""A region cut into patches that can be unrolled, and the smooth surface over each of them."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from nrdf.errors import ProcessError
+from nrdf.process.border import CONTEXT, OTHER, OWN, Border
+from nrdf.process.surface import Surface, quadrics, typical_spacing, unit
+from nrdf.process.unroll import Unrolled, unroll
+
+log = logging.getLogger(__name__)
+
+_FEWEST = 4  # points of a patch
+_BENT, _BENT_SHARE = 0.2, 0.03  # a patch with more of its points bent this much is cut in two
+_DEEPEST = 5  # cuts
+_SCRAP = 0.03  # smaller shares are not cut off
+_FITTED = 20
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A connected piece of a region that lies flat without folds, with what surrounds it.
+
+    index: (n,) of its points among the surface's; points: (n, 3), m; uv: (n, 2), m, their places
+    in the plane; tangents: (n, 2, 3), unit, along u and v; label: (n,), OWN, OTHER or CONTEXT;
+    spacing: typical distance between points, m.
+    """
+
+    index: np.ndarray
+    points: np.ndarray
+    uv: np.ndarray
+    tangents: np.ndarray
+    label: np.ndarray
+    spacing: float
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self.uv)
+
+    @cached_property
+    def border(self) -> Border:
+        return Border(self.uv, self.label, self.spacing)
+
+    def at(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The smooth surface at `uv` (m, 2): positions (m, 3), derivatives by u and v (m, 2, 3).
+
+        Moving least squares in the plane: a quadratic map fitted to the nearest points.
+        """
+        distance, near = self._tree.query(uv, min(_FITTED, len(self.uv)))
+        weight = (1.0 - (distance / (1.05 * distance[:, -1:] + 1e-12)) ** 2) ** 2
+        offset = (self.uv[near] - uv[:, None]) / self.spacing
+        origin = self.points[near[:, 0]]
+        found = quadrics(offset, self.points[near] - origin[:, None], weight)
+        return origin + found[:, 0], found[:, 1:3] / self.spacing
+
+    @cached_property
+    def metric(self) -> np.ndarray:
+        """Metric tensors (n, 2, 2) at the points: lengths on the surface by lengths in uv."""
+        along = self.at(self.uv)[1]
+        return np.einsum("nia,nja->nij", along, along)
+
+    def angle_of(self, direction: np.ndarray) -> tuple[float, float]:
+        """Angle (rad) in the plane of a direction (3,), and its mean share [0, 1] that lies in
+        the surface."""
+        seen = self.tangents[self.label == OWN] @ (direction / np.linalg.norm(direction))
+        mean = seen.mean(axis=0)
+        return float(np.arctan2(mean[1], mean[0])), float(np.linalg.norm(mean))
+
+    @cached_property
+    def extent(self) -> tuple[float, float, float]:
+        """Length and width (m) of the smallest rectangle around, and the angle of its length."""
+        own = self.uv[self.label == OWN]
+        try:
+            corners = own[ConvexHull(own).vertices]
+        except QhullError:  # all in one line
+            corners = own
+        side = np.roll(corners, -1, axis=0) - corners
+        angles = np.unique(np.arctan2(side[:, 1], side[:, 0]) % (np.pi / 2))
+        c, s = np.cos(angles), np.sin(angles)
+        length = np.ptp(np.outer(corners[:, 0], c) + np.outer(corners[:, 1], s), axis=0)
+        width = np.ptp(np.outer(corners[:, 1], c) - np.outer(corners[:, 0], s), axis=0)
+        best = int(np.argmin(length * width))
+        if length[best] >= width[best]:
+            return float(length[best]), float(width[best]), float(angles[best])
+        return float(width[best]), float(length[best]), float(angles[best] + np.pi / 2)
+
+
+def patches_of(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
+    """The patches of a region, indices (k,) into the surface's cloud, the largest first.
+
+    Found once for each region of a surface. Raises ProcessError for a region that is empty, not of
+    this cloud, or whose points are too few or too scattered.
+    """
+    own = surface.indices(region)
+    key = own.tobytes()
+    if key not in surface.patches:
+        surface.patches[key] = _cut(surface, own)
+    return surface.patches[key]
+
+
+def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
+    waiting = [(part, 0) for part in _components(surface, region)]
+    found: list[tuple[np.ndarray, np.ndarray, Unrolled]] = []
+    while waiting:
+        own, depth = waiting.pop()
+        if len(own) < _FEWEST:
+            continue
+        # No context where it closes a tube or goes round an edge.
+        for hops in (1 if depth else 2, 0):
+            around = _surroundings(surface, own, hops)
+            edges = _edges_within(surface, around)
+            flat = unroll(surface.points[around], surface.normals[around], edges, surface.spacing)
+            bent = flat.error[np.isin(around, own)] > _BENT
+            if bent.mean() <= _BENT_SHARE:
+                break
+        if depth < _DEEPEST and bent.mean() > _BENT_SHARE:
+            waiting += [(part, depth + 1) for part in _halves(surface, own)]
+        else:
+            found.append((own, around, flat))
+    if not found:
+        raise ProcessError(
+            f"the region's {len(region)} points are too few or too scattered for a tool path; it "
+            f"needs at least {_FEWEST} neighbouring ones"
+        )
+    found.sort(key=lambda patch: -len(patch[0]))
+    owner = np.full(len(surface.points), -1)
+    owner[region] = len(found)  # scattered points: of whichever patch is around them
+    for k, (own, _, _) in enumerate(found):
+        owner[own] = k
+    scattered = int((owner == len(found)).sum())
+    if scattered:
+        log.debug("%d scattered points of a region of %d have no lines", scattered, len(region))
+    return tuple(
+        _patch(surface, around, flat, _labels(owner[around], k, len(found)))
+        for k, (_, around, flat) in enumerate(found)
+    )
+
+
+def _labels(owner: np.ndarray, patch: int, nobody: int) -> np.ndarray:
+    """Labels (n,) from the patch that owns each point: -1 where none of the region does."""
+    label = np.where(owner == -1, CONTEXT, OTHER)
+    return np.where((owner == patch) | (owner == nobody), OWN, label)
+
+
+def _patch(surface: Surface, around: np.ndarray, flat: Unrolled, label: np.ndarray) -> Patch:
+    count = min(5, len(around))
+    distance = cKDTree(flat.uv).query(flat.uv[label == OWN], count)[0][:, -1]
+    spacing = min(typical_spacing(distance, count - 1), 1.3 * surface.spacing)
+    return Patch(around, surface.points[around], flat.uv, flat.tangents, label, spacing)
+
+
+def _components(surface: Surface, chosen: np.ndarray) -> list[np.ndarray]:
+    """Connected sets of the chosen points (k,), each as indices of the surface's points."""
+    which = _components_of(_edges_within(surface, chosen), len(chosen))
+    order = np.argsort(which, kind="stable")
+    return np.split(chosen[order], np.cumsum(np.bincount(which))[:-1])
+
+
+def _components_of(edges: np.ndarray, count: int) -> np.ndarray:
+    """The number (n,) of the connected component that each of `count` points is in."""
+    graph = sparse.csr_matrix((np.ones(len(edges)), edges.T), (count, count))
+    return connected_components(graph, directed=False)[1]
+
+
+def _edges_within(surface: Surface, chosen: np.ndarray) -> np.ndarray:
+    """Edges (e, 2) between the chosen points (k,), as indices into them."""
+    place = np.full(len(surface.points), -1)
+    place[chosen] = np.arange(len(chosen))
+    edges = place[surface.edges]
+    return edges[(edges >= 0).all(axis=1)]
+
+
+def _surroundings(surface: Surface, own: np.ndarray, hops: int = 2) -> np.ndarray:
+    """Indices of `own` and of what is at most `hops` edges away."""
+    inside = np.zeros(len(surface.points), bool)
+    inside[own] = True
+    for _ in range(hops):
+        touched = surface.edges[inside[surface.edges].any(axis=1)]
+        inside[touched] = True
+    return np.flatnonzero(inside)
+
+
+def _halves(surface: Surface, own: np.ndarray) -> list[np.ndarray]:
+    """Cut a set of points that does not lie flat in two, by where their normals point."""
+    normals = surface.normals[own]
+    edges = _edges_within(surface, own)
+    i, j = np.concatenate([edges, edges[:, ::-1]]).T
+    one = normals[np.argmin(normals @ normals.mean(axis=0))]
+    other = normals[np.argmin(normals @ one)]
+    if one @ other > 0.5:  # bent without turning far: cut across its length
+        offset = surface.points[own] - surface.points[own].mean(axis=0)
+        side = offset @ np.linalg.svd(offset, full_matrices=False)[2][0] > 0.0
+    else:
+        for _ in range(10):
+            side = normals @ (one - other) > 0.0
+            one, other = unit(normals[side].mean(axis=0)), unit(normals[~side].mean(axis=0))
+        for _ in range(4):  # the seam follows neighbourhoods, not single points
+            vote = 2.0 * side - 1.0
+            side = vote + np.bincount(i, vote[j], len(own)) > 0.0
+        for half in (True, False):  # scraps go to the other side
+            part = _components_of(edges[(side[edges] == half).all(axis=1)], len(own))
+            small = np.bincount(part)[part] < max(12, _SCRAP * len(own))
+            side = side ^ (small & (side == half))
+    return [part for half in (own[side], own[~side]) for part in _components(surface, half)]

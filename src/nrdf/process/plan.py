@@ -1,0 +1,280 @@
+"""From a taught strategy and a region of a surface to the segments that a robot drives."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from nrdf.errors import ProcessError, unknown_name
+from nrdf.process.contour import contour, spiral
+from nrdf.process.frames import steady, surface_frames, tool_quaternions, travel_of
+from nrdf.process.patch import Patch, patches_of
+from nrdf.process.raster import Stroke, raster
+from nrdf.process.surface import Surface, unit
+from nrdf.process.toolpath import Segment
+
+log = logging.getLogger(__name__)
+
+Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
+TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
+LEAST_IN_SURFACE = 0.2
+"""A direction with a smaller share of its length in a patch's surface gives no direction there."""
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """How a region is worked: SI throughout.
+
+    direction: (3,) main direction of the raster's lines in the surface's frame, projected to the
+    surface; None for the region's longest extent. stepover_m: between neighbouring lines, along
+    the surface; spacing_m: between waypoints, about; edge_margin_m: waypoints keep that far inside
+    the region's border, and the footprint may reach over; tool_radius_m: of the footprint.
+    lead_rad: leans the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
+    the normal. standoff_m: from the tool centre point to the surface along the tool's axis.
+    passes: the lines are driven that often, back and forth. Approach and retract: length of the
+    free moves before and after a line, their angle from the normal (0: along the normal; pi/2:
+    along the line), and their feed.
+    """
+
+    trajectory: Trajectory = "raster"
+    direction: np.ndarray | None = None
+    stepover_m: float = 0.02
+    spacing_m: float = 0.01
+    edge_margin_m: float = 0.0
+    tool_radius_m: float = 0.025
+    lead_rad: float = 0.0
+    tilt_rad: float = 0.0
+    standoff_m: float = 0.0
+    passes: int = 1
+    feed_m_s: float = 0.1
+    force_n: float | None = None
+    dwell_s: float = 0.0
+    approach_distance_m: float = 0.05
+    approach_angle_rad: float = 0.0
+    approach_feed_m_s: float = 0.25
+    retract_distance_m: float = 0.05
+    retract_angle_rad: float = 0.0
+    retract_feed_m_s: float = 0.25
+
+    def __post_init__(self) -> None:
+        if self.trajectory not in TRAJECTORIES:
+            raise ProcessError(unknown_name("trajectory", self.trajectory, TRAJECTORIES))
+        above = ("stepover_m", "spacing_m", "tool_radius_m", "feed_m_s", "approach_feed_m_s")
+        for name in (*above, "retract_feed_m_s", "passes"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ProcessError(f"{name} is {getattr(self, name)}; give a value above 0")
+        lengths = ("edge_margin_m", "standoff_m", "approach_distance_m", "retract_distance_m")
+        for name in (*lengths, "dwell_s"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ProcessError(f"{name} is {getattr(self, name)}; give 0 or more")
+        if self.direction is not None:
+            direction = np.asarray(self.direction, dtype=np.float64)
+            if direction.shape != (3,) or not 0.0 < np.linalg.norm(direction) < np.inf:
+                raise ProcessError(f"direction is {self.direction}; give 3 numbers, not all 0")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A stroke on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
+
+    contacts: np.ndarray
+    normals: np.ndarray
+
+    def reversed(self) -> Line:
+        return Line(self.contacts[::-1], self.normals[::-1])
+
+
+def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segment, ...]:
+    """Segments that work `region`, indices (k,) of the surface's points, in driving order.
+
+    The region is cut into patches that lie flat without folds (`nrdf.process.patch`), and each into
+    lines. Every line has its approach, process and departure segments; an approach or retract
+    distance of 0 leaves its segments out. Raises ProcessError for a margin that leaves nothing of
+    the region, a stepover wider than it, or a direction that stands on it.
+    """
+    patches = patches_of(surface, region)
+    _check_stepover(patches, strategy)
+    blocks: list[list[Line]] = []
+    for strokes_of in _sweeps(patches, strategy):
+        sweep: list[list[Line]] = []
+        for patch, parts in strokes_of:
+            found = iter(_lines(surface, patch, [s for part in parts for s in part], strategy))
+            sweep += [[next(found) for _ in part] for part in parts]
+        blocks += _nearest_first(sweep)
+    if not blocks:
+        deepest = max(patch.border.deepest for patch in patches)
+        raise ProcessError(
+            f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
+            f"innermost place is {deepest:.3g} m from its border; give less than that"
+        )
+    contacts = [line.contacts for block in blocks for line in block]
+    normals = [line.normals for block in blocks for line in block]
+    return drive(_held(contacts, normals, strategy), normals, strategy)
+
+
+def drive(
+    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+    normals: Sequence[np.ndarray],
+    strategy: Strategy,
+) -> tuple[Segment, ...]:
+    """Segments that drive given lines, in that order, with approach and retract.
+
+    lines: positions (n, 3), m, of the tool centre point, and quaternions_xyzw (n, 4), for each;
+    normals: (n, 3), outward, of the surface under each. Every second pass drives the lines
+    backwards, the tool turned half around the normal.
+    """
+    segments: list[Segment] = []
+    number = 0
+    for index in range(strategy.passes):
+        order = range(len(lines)) if index % 2 == 0 else range(len(lines) - 1, -1, -1)
+        for k in order:
+            (positions, quaternions), outward = lines[k], normals[k]
+            if index % 2:
+                positions, outward = positions[::-1], outward[::-1]
+                half = Rotation.from_rotvec(np.pi * outward)
+                quaternions = steady((half * Rotation.from_quat(quaternions[::-1])).as_quat())
+            segments += _segments(positions, quaternions, outward, number, strategy)
+            number += 1
+    return tuple(segments)
+
+
+def _held(
+    contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Positions and quaternions of a tool along lines on the surface."""
+    held = []
+    for line, outward in zip(contacts, normals, strict=True):
+        travel = travel_of(line, 0.5 * strategy.stepover_m)
+        turns = tool_quaternions(travel, outward, strategy.lead_rad, strategy.tilt_rad)
+        axis = Rotation.from_quat(turns).as_matrix()[:, :, 2]
+        held.append((line - strategy.standoff_m * axis, turns))
+    return held
+
+
+def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
+    length, width = (max(patch.extent[k] + patch.spacing for patch in patches) for k in (0, 1))
+    if strategy.stepover_m > length:
+        raise ProcessError(
+            f"stepover_m is {strategy.stepover_m:g}, wider than the region, which measures "
+            f"{length:.3g} by {width:.3g} m; give less than {length:.3g}"
+        )
+
+
+def _sweeps(
+    patches: Sequence[Patch], strategy: Strategy
+) -> list[list[tuple[Patch, list[list[Stroke]]]]]:
+    """For each sweep over the region, every patch's strokes by its connected parts."""
+    stepover, margin = strategy.stepover_m, strategy.edge_margin_m
+    if strategy.trajectory == "contour":
+        return [[(patch, contour(patch, stepover, margin)) for patch in patches]]
+    if strategy.trajectory == "spiral":
+        return [[(patch, spiral(patch, stepover, margin)) for patch in patches]]
+    angles = _angles(patches, strategy.direction)
+    turns = (0.0, np.pi / 2) if strategy.trajectory == "cross-hatch" else (0.0,)
+    return [
+        [
+            (patch, raster(patch, angle + turn, stepover, margin))
+            for patch, angle in zip(patches, angles, strict=True)
+        ]
+        for turn in turns
+    ]
+
+
+def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[float]:
+    """The angle of a raster's lines in the plane of each patch."""
+    longest = [patch.extent[2] for patch in patches]
+    if direction is None:
+        return longest
+    seen = [patch.angle_of(np.asarray(direction, dtype=np.float64)) for patch in patches]
+    if max(share for _, share in seen) < LEAST_IN_SURFACE:
+        raise ProcessError(
+            f"direction {np.asarray(direction).tolist()} stands on the region instead of running "
+            "along it; give one along the surface, or none for the region's longest extent"
+        )
+    return [
+        angle if share >= LEAST_IN_SURFACE else other
+        for (angle, share), other in zip(seen, longest, strict=True)
+    ]
+
+
+def _lines(
+    surface: Surface, patch: Patch, strokes: Sequence[Stroke], strategy: Strategy
+) -> list[Line]:
+    """Strokes brought onto the surface, their waypoints evenly spaced."""
+    if not strokes:
+        return []
+    cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
+    even = []
+    for stroke, places in zip(
+        strokes, np.split(patch.at(np.concatenate(strokes))[0], cuts), strict=True
+    ):
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        walked = np.concatenate([[0.0], np.cumsum(steps)])
+        count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
+        at = np.linspace(0.0, walked[-1], count + 1)
+        even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
+    flat, along = patch.at(np.concatenate(even))
+    contacts, outward = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
+    normals = surface.smooth_normals(contacts, outward, strategy.tool_radius_m)
+    cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
+    return [
+        Line(*line) for line in zip(np.split(contacts, cuts), np.split(normals, cuts), strict=True)
+    ]
+
+
+def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
+    """Blocks of lines ordered, and driven forwards or backwards, so that ways between are short."""
+    waiting, ordered = list(blocks), []
+    place: np.ndarray | None = None
+    while waiting:
+        if place is None:
+            block = waiting.pop(0)
+        else:
+            ends = np.array([[b[0].contacts[0], b[-1].contacts[-1]] for b in waiting])
+            away = np.linalg.norm(ends - place, axis=2)
+            which, end = np.unravel_index(np.argmin(away), away.shape)
+            block = waiting.pop(int(which))
+            if end == 1:
+                block = [line.reversed() for line in block[::-1]]
+        ordered.append(block)
+        place = block[-1].contacts[-1]
+    return ordered
+
+
+def _segments(
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    normals: np.ndarray,
+    number: int,
+    strategy: Strategy,
+) -> list[Segment]:
+    """Approach, process and departure of one line."""
+    work = Segment(
+        "process", number, positions, quaternions,
+        strategy.feed_m_s, strategy.force_n, strategy.dwell_s,
+    )  # fmt: skip
+    segments = [work]
+    ends = surface_frames(
+        Rotation.from_quat(quaternions[[0, -1]]).as_matrix()[:, :, 0], normals[[0, -1]]
+    )
+    if strategy.approach_distance_m > 0.0:
+        away = _leaving(ends[0], -strategy.approach_angle_rad)
+        start = positions[0] + strategy.approach_distance_m * away
+        way, held = np.stack([start, positions[0]]), quaternions[[0, 0]]
+        segments.insert(0, Segment("approach", number, way, held, strategy.approach_feed_m_s))
+    if strategy.retract_distance_m > 0.0:
+        away = _leaving(ends[1], strategy.retract_angle_rad)
+        stop = positions[-1] + strategy.retract_distance_m * away
+        way, held = np.stack([positions[-1], stop]), quaternions[[-1, -1]]
+        segments.append(Segment("departure", number, way, held, strategy.retract_feed_m_s))
+    return segments
+
+
+def _leaving(frame: np.ndarray, angle: float) -> np.ndarray:
+    """The direction at `angle` (rad) from the normal towards x of an upright frame (3, 3)."""
+    return np.sin(angle) * frame[:, 0] - np.cos(angle) * frame[:, 2]

@@ -1,0 +1,165 @@
+"""The report of a transfer: what was found, what is driven, how well, and what to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nrdf.process.coverage import Measures
+from nrdf.process.knowledge import Process
+from nrdf.process.limits import Limits
+from nrdf.process.transfer import Transferred, TransferredPath
+from nrdf.units import in_words
+
+DOUBTFUL = 0.4
+"""Confidence below which a region that was found should be looked at."""
+FIGURES = (
+    "coverage", "overlap", "line spacing, mean · worst", "off surface, 99 % · worst",
+    "axis off, 99 %", "length", "time",
+)  # fmt: skip
+SHORT_FIGURES = ("coverage", "widest lines", "off surface", "axis off", "time")
+_LEAST_COVERAGE = 0.97
+_WIDEST_LINES = 1.15  # times the stepover
+_FARTHEST_M = 0.001
+_STEEPEST_RAD = np.radians(5.0)
+
+
+def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
+    """Everything of a transfer that a report says, as plain values; lengths in metres."""
+    regions = transferred.regions
+    paths = [_path(step, bool(regions[step.region].missing)) for step in transferred.paths]
+    driven = [step.measures for step in transferred.paths if step.measures is not None]
+    warnings = list(transferred.warnings)
+    warnings += [f"region '{n}': {w}" for n, w in _region_warnings(transferred)]
+    for step in paths:
+        if step["warnings"]:
+            said = "; ".join(step["warnings"])
+            warnings.append(f"region '{step['region']}', {step['process']}: {said}")
+    return {
+        "category": transferred.lesson.knowledge.category,
+        "unit": "m",
+        "frame": transferred.target.frame,
+        "regions": _regions(transferred),
+        "paths": paths,
+        "total": {
+            "paths": len(driven),
+            "skipped": len(transferred.paths) - len(driven),
+            "path_length_m": sum(m.path_length_m for m in driven),
+            "process_length_m": sum(m.process_length_m for m in driven),
+            "cycle_time_s": sum(m.cycle_time_s for m in driven),
+        },
+        "warnings": warnings,
+        "limits": {
+            "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
+            "not_met": limits.broken(transferred),
+        },
+        "seconds": {name: round(value, 4) for name, value in transferred.seconds.items()},
+    }
+
+
+def _regions(transferred: Transferred) -> dict[str, Any]:
+    reference, target = transferred.lesson, transferred.target
+    regions = {}
+    for name, region in transferred.regions.items():
+        match = region.match
+        regions[name] = {
+            "found": not region.missing,
+            "skipped_because": region.missing or None,
+            "confidence": round(match.score, 4),
+            "points": len(match.indices),
+            "share_of_target": round(len(match.indices) / len(target), 5),
+            "share_of_reference": round(
+                len(reference.regions[name]) / len(reference.cloud), 5
+            ),
+        }  # fmt: skip
+    return regions
+
+
+def _region_warnings(transferred: Transferred) -> list[tuple[str, str]]:
+    lines = []
+    for name, region in transferred.regions.items():
+        if not region.missing and region.match.score < DOUBTFUL:
+            lines.append((name, f"doubtful: confidence {region.match.score:.2f}; look at it"))
+    return lines
+
+
+def _path(step: TransferredPath, skipped: bool) -> dict[str, Any]:
+    process = step.process
+    content: dict[str, Any] = {
+        "region": step.region,
+        "process": process.label,
+        "kind": process.kind,
+        "transfer": step.way,
+        "planned": step.path is not None,
+        "left_out_because": step.reason or None,
+        "asked": _asked(process),
+        "warnings": [*step.warnings],
+    }
+    if step.path is not None and step.measures is not None:
+        process_segments = [s for s in step.path.segments if s.kind == "process"]
+        content["lines"] = len({segment.line for segment in process_segments})
+        content["waypoints"] = sum(len(segment.positions) for segment in step.path.segments)
+        content["measures"] = vars(step.measures)
+        content["warnings"] += measure_warnings(process, step.measures)
+    elif not skipped:
+        content["warnings"].append(f"no tool path: {step.reason}")
+    return content
+
+
+def _asked(process: Process) -> dict[str, Any]:
+    """What the process asks for, apart from waypoints."""
+    content = process.model_dump(mode="json", exclude_none=True, exclude={"waypoints", "name"})
+    content["stepover_m"] = process.distance_between_lines_m
+    return content
+
+
+def measure_warnings(process: Process, measures: Measures) -> list[str]:
+    """What a person should look at before a path is driven."""
+    lines = []
+    if measures.coverage < _LEAST_COVERAGE:
+        lines.append(
+            f"the tool does not reach {1 - measures.coverage:.1%} of the region inside its margin"
+        )
+    worst, stepover = measures.line_spacing_worst_m, process.distance_between_lines_m
+    if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
+        lines.append(
+            f"lines are up to {in_words('spacing_m', worst)} apart; "
+            f"{in_words('stepover_m', stepover)} were asked for"
+        )
+    if measures.surface_distance_99_m > _FARTHEST_M and process.trajectory != "taught":
+        away = in_words("distance_m", measures.surface_distance_99_m)
+        lines.append(f"1 % of the waypoints are more than {away} off the surface")
+    if measures.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
+        error = in_words("error_rad", measures.axis_error_99_rad)
+        lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
+    return lines
+
+
+def figures(measures: Mapping[str, Any]) -> list[str]:
+    """A tool path's measures as people read them, one for each of `FIGURES`."""
+    coverage, _, _, axis, time = short_figures(measures)
+    length = f"{measures['process_length_m']:.2f} m"
+    spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
+    away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
+    return [coverage, f"{measures['overlap']:.0%}", spacing, away, axis, length, time]
+
+
+def short_figures(measures: Mapping[str, Any]) -> list[str]:
+    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+    return [
+        f"{measures['coverage']:.1%}",
+        _millimetres(measures["line_spacing_worst_m"]),
+        _millimetres(measures["surface_distance_99_m"]),
+        f"{np.degrees(measures['axis_error_99_rad']):.1f}°",
+        f"{measures['cycle_time_s']:.0f} s",
+    ]
+
+
+def _millimetres(*lengths: float | None) -> str:
+    """Lengths in metres side by side in millimetres; a dash where one is missing."""
+    known = [length for length in lengths if length is not None]
+    if len(known) < len(lengths):
+        return "–"
+    return " · ".join(f"{1e3 * length:.1f}" for length in known) + " mm"

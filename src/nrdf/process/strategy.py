@@ -1,0 +1,57 @@
+"""From a process of the knowledge file to what the planner takes, and the tool path around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nrdf.process.knowledge import Process
+from nrdf.process.plan import Strategy
+from nrdf.process.toolpath import Segment, ToolPath
+
+
+def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strategy:
+    """The planner's strategy for a process.
+
+    `direction` (3,) replaces the process's own, which is in the reference's frame. A taught
+    process has a strategy too, for measuring it: its trajectory is of no meaning.
+    """
+    given = process.direction if direction is None else direction
+    return Strategy(
+        trajectory="raster" if process.trajectory == "taught" else process.trajectory,
+        direction=None if given is None else np.asarray(given, float),
+        stepover_m=process.distance_between_lines_m,
+        spacing_m=process.spacing_m,
+        edge_margin_m=process.edge_margin_m,
+        tool_radius_m=process.tool.radius_m,
+        lead_rad=process.lead_rad,
+        tilt_rad=process.tilt_rad,
+        standoff_m=process.standoff_m,
+        passes=process.passes,
+        feed_m_s=process.feed_m_s,
+        force_n=process.force_n,
+        dwell_s=process.dwell_s,
+        approach_distance_m=process.approach.distance_m,
+        approach_angle_rad=process.approach.angle_rad,
+        approach_feed_m_s=process.approach.feed_m_s,
+        retract_distance_m=process.retract.distance_m,
+        retract_angle_rad=process.retract.angle_rad,
+        retract_feed_m_s=process.retract.feed_m_s,
+    )
+
+
+def tool_path(region: str, process: Process, segments: Sequence[Segment]) -> ToolPath:
+    """Segments on a region as the tool path of a process."""
+    return ToolPath(
+        region=region,
+        process=process.label,
+        tool=process.tool.name,
+        tool_radius_m=process.tool.radius_m,
+        segments=tuple(segments),
+        spindle_rad_s=process.spindle_rad_s,
+        parameters=dict(process.parameters),
+        tcp_m=process.tool.tcp_m,
+        tcp_quaternion_xyzw=process.tool.tcp_quaternion_xyzw,
+        force_tolerance_n=process.force_tolerance_n,
+    )

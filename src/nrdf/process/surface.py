@@ -1,0 +1,198 @@
+"""The smooth surface that a point cloud stands for."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.errors import ProcessError
+from nrdf.geometry import thin
+
+if TYPE_CHECKING:
+    from nrdf.process.patch import Patch
+
+MOST_POINTS = 30_000
+"""A larger cloud is thinned evenly: finer points than a tool can follow only cost time."""
+SAME_SIDE = 0.5
+"""Least cosine between the normals of points that may belong to one sheet."""
+_LEVEL = 0.7  # the same for points that one quadric is fitted to
+_NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
+_FITTED = 20
+
+
+class Surface:
+    """An object's cloud with outward normals, as a surface to work on.
+
+    points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
+    part are told apart by their normals alone. Raises ProcessError if the two do not fit each
+    other, are not finite, or are fewer than 8.
+    """
+
+    def __init__(self, points_m: np.ndarray, normals: np.ndarray) -> None:
+        points = np.ascontiguousarray(points_m, dtype=np.float64)
+        normals = np.array(normals, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3 or normals.shape != points.shape:
+            raise ProcessError(
+                f"points {points.shape} and normals {normals.shape} must both be (n, 3)"
+            )
+        if len(points) < 8 or not (np.isfinite(points).all() and np.isfinite(normals).all()):
+            raise ProcessError(
+                f"a surface needs at least 8 finite points with normals, not {len(points)}"
+            )
+        self.size = len(points)
+        self._kept = thin(points, MOST_POINTS, np.random.default_rng(0))
+        self.points = points[self._kept]
+        self.normals = unit(normals[self._kept])
+        self.patches: dict[bytes, tuple[Patch, ...]] = {}
+
+    def indices(self, region: np.ndarray) -> np.ndarray:
+        """Indices (k,), ascending, of `points` for a region (indices into the cloud as given).
+
+        Raises ProcessError if it is empty or does not fit the cloud.
+        """
+        region = np.unique(np.asarray(region))
+        if region.size == 0 or not np.issubdtype(region.dtype, np.integer):
+            raise ProcessError("a region must be the indices of one or more of the cloud's points")
+        if region[0] < 0 or region[-1] >= self.size:
+            raise ProcessError(
+                f"a region has indices {region[0]} to {region[-1]}; the cloud's are 0 to "
+                f"{self.size - 1}"
+            )
+        mask = np.zeros(self.size, bool)
+        mask[region] = True
+        return np.flatnonzero(mask[self._kept])
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.points)
+
+    @cached_property
+    def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.tree.query(self.points, min(_ASKED + 1, len(self.points)))
+
+    @cached_property
+    def spacing(self) -> float:
+        """Typical distance between points, m: the side of the square that each has to itself."""
+        count = min(8, len(self.points) - 1)
+        return typical_spacing(self._nearest[0][:, count], count)
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Neighbours (e, 2) on one sheet, each pair once, the lower index first.
+
+        Pairs that lean out of each other's tangent plane, or whose normals differ much, are left
+        out, so that no edge leads through a thin part.
+        """
+        distance, near = self._nearest
+        along = self.points[near] - self.points[:, None]
+        rise = np.abs(np.einsum("nka,na->nk", along, self.normals))
+        rise = np.maximum(rise, np.abs(np.einsum("nka,nka->nk", along, self.normals[near])))
+        alike = np.einsum("nka,na->nk", self.normals[near], self.normals) > SAME_SIDE
+        good = alike & (rise <= 0.6 * distance) & (distance < 3.0 * self.spacing)
+        good[:, 0] = False
+        good &= np.cumsum(good, axis=1) <= _NEIGHBOURS
+        i, k = np.nonzero(good)
+        pair = np.sort(np.stack([i, near[i, k]], axis=1), axis=1)
+        code = np.unique(pair[:, 0] * len(self.points) + pair[:, 1])
+        return np.stack(np.divmod(code, len(self.points)), axis=1)
+
+    def project(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The nearest places on the smooth surface, and its normals there, each (m, 3).
+
+        points: (m, 3), m, near the surface; normals: (m, 3), roughly outward, tell the side.
+        Moving least squares: a quadric over the tangent plane, fitted to the nearest points of the
+        side (Alexa et al., 2003). A point with no surface of its side around stays where it is.
+        """
+        points, normals = np.array(points, dtype=np.float64), unit(normals)
+        near = self._nearest_to(points, 2 * _FITTED)
+        for _ in range(2):
+            distance, facing = self._seen(points, normals, near)
+            good = facing > _LEVEL
+            good &= np.cumsum(good, axis=1) <= _FITTED
+            reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
+            weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * facing**2
+            enough = (weight > 0).sum(axis=1) >= 6
+            mean = np.einsum("mk,mka->ma", weight, self.normals[near])
+            normals = np.where(enough[:, None], unit(mean), normals)
+            frame = tangent_frames(normals)
+            offset = np.einsum("mkb,mab->mka", self.points[near] - points[:, None], frame)
+            scale = self.spacing
+            found = quadrics(offset[..., :2] / scale, offset[..., 2:], weight)
+            height, slope = found[:, 0, 0], found[:, 1:3, 0] / scale
+            height = np.clip(height, -scale, scale)  # beyond an edge, quadrics run away
+            points = points + np.where(enough, height, 0.0)[:, None] * normals
+            tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
+            normals = np.where(enough[:, None], unit(tilted), normals)
+        return points, normals
+
+    def smooth_normals(
+        self, points: np.ndarray, normals: np.ndarray, radius_m: float
+    ) -> np.ndarray:
+        """Outward normals (m, 3), averaged over what faces a tool at points (m, 3).
+
+        That is the sheet within `radius_m` that faces the average itself, found from `normals`
+        (m, 3), which tell the side: what a flat tool of that radius feels.
+        """
+        radius = max(radius_m, 2.0 * self.spacing)
+        count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
+        points, normals = np.asarray(points, dtype=np.float64), unit(normals)
+        near = self._nearest_to(points, count)
+        for _ in range(6):
+            distance, facing = self._seen(points, normals, near)
+            weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
+            mean = np.einsum("mk,mka->ma", weight, self.normals[near])
+            normals = np.where(weight.any(axis=1)[:, None], unit(mean), normals)
+        return normals
+
+    def _nearest_to(self, points: np.ndarray, count: int) -> np.ndarray:
+        return self.tree.query(points, min(count, len(self.points)))[1]
+
+    def _seen(
+        self, points: np.ndarray, normals: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Distances of the cloud points `near` (m, k), and cosines of their normals to `normals`
+        (m, 3), 0 for points of another sheet."""
+        offset = self.points[near] - points[:, None]
+        distance = np.sqrt(np.einsum("mka,mka->mk", offset, offset))
+        facing = np.einsum("mka,ma->mk", self.normals[near], normals)
+        rise = np.abs(np.einsum("mka,ma->mk", offset, normals))
+        good = (facing > SAME_SIDE) & (rise < 0.6 * distance + self.spacing)
+        return distance, np.where(good, facing, 0.0)
+
+
+def typical_spacing(distance: np.ndarray, number: int) -> float:
+    """Side of the square that each point has to itself, from the distances (n,) of the points'
+    `number`-th neighbours."""
+    # Of points spread at random, half have that neighbour within this area.
+    return float(np.median(distance) * np.sqrt(np.pi / (number - 1.0 / 3.0)))
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) brought to unit length; zero stays zero."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors) / np.maximum(length, 1e-12)
+
+
+def tangent_frames(normals: np.ndarray) -> np.ndarray:
+    """Right-handed frames (m, 3, 3) at unit normals (m, 3): rows are two tangents, the normal."""
+    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = unit(np.cross(normals, helper))
+    return np.stack([first, np.cross(normals, first), normals], axis=1)
+
+
+def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Weighted least squares of 1, x, y, x²/2, xy, y²/2: coefficients (m, 6, c).
+
+    offset: (m, k, 2), of order 1; values: (m, k, c); weight: (m, k). Curvature that the points do
+    not fix is kept small.
+    """
+    x, y = offset[..., 0], offset[..., 1]
+    basis = np.stack([np.ones_like(x), x, y, x * x / 2.0, x * y, y * y / 2.0], axis=-1)
+    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
+    weighted = basis * weight[..., None]
+    normal = np.einsum("mki,mkj->mij", weighted, basis)
+    normal += np.diag([1e-9, 1e-5, 1e-5, 3e-3, 3e-3, 3e-3])
+    return np.linalg.solve(normal, np.einsum("mki,mkc->mic", weighted, values))

@@ -1,0 +1,254 @@
+"""Process knowledge transferred to a new object: regions found, tool paths planned or carried.
+
+A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any number of targets.
+
+    teacher = nrdf.teach("chair.yaml")
+    job = teacher.transfer(nrdf.read_cloud("new.ply"))
+    job.write("job/")
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from nrdf.cloud import PointCloud
+from nrdf.errors import ModelError, ProcessError
+from nrdf.output import output_folder
+from nrdf.process.carry import Correspondence, TaughtSurface
+from nrdf.process.coverage import Measures, measure
+from nrdf.process.knowledge import Line, Process, Transfer
+from nrdf.process.lesson import Lesson, in_metres, known_unit, overlaps
+from nrdf.process.plan import drive, plan
+from nrdf.process.strategy import strategy_of, tool_path
+from nrdf.process.taught import TaughtLine, taught_lines
+from nrdf.process.toolpath import Segment, ToolPath
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.match import Match
+from nrdf.regions.model import Model
+
+log = logging.getLogger(__name__)
+
+MIN_CONFIDENCE = 0.2
+"""A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
+
+
+@dataclass(frozen=True)
+class FoundRegion:
+    """A region on the target: its match; `missing` says why it is skipped, "" where it is not."""
+
+    name: str
+    match: Match
+    missing: str = ""
+
+
+@dataclass(frozen=True)
+class TransferredPath:
+    """One process on one region of the target.
+
+    number: which of the region's processes, from 0. process: as it is there (its direction, or its
+    carried waypoints, in the target's frame). way: how it came. path, measures: None where there
+    is none, for the `reason`.
+    """
+
+    region: str
+    number: int
+    process: Process
+    way: Transfer
+    path: ToolPath | None = None
+    measures: Measures | None = None
+    warnings: tuple[str, ...] = ()
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """Everything on one target, in metres in its own frame; paths in the order they are driven.
+
+    target: with normals, estimated where its file had none. seconds: time by phase.
+    """
+
+    lesson: Lesson
+    target: PointCloud
+    regions: dict[str, FoundRegion]
+    paths: tuple[TransferredPath, ...]
+    warnings: tuple[str, ...]
+    seconds: dict[str, float]
+
+    def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
+        """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
+
+        Raises OutputError if it is not empty, without `overwrite`, or cannot be written.
+        """
+        from nrdf.process.job_folder import write_transfer
+        from nrdf.process.limits import Limits
+
+        with output_folder(path, overwrite) as folder:
+            write_transfer(folder, self, Limits(), title, {})
+
+
+class Teacher:
+    """Knowledge on its reference, as a model sees it.
+
+    Raises ModelError for a model of another category.
+    """
+
+    def __init__(self, lesson: Lesson, model: Model) -> None:
+        category = lesson.knowledge.category
+        if model.category and model.category != category:
+            raise ModelError(
+                f"the model is for the category {model.category}, but the knowledge is about a "
+                f"{category}; give a model for {category}"
+            )
+        self.lesson, self.model = lesson, model
+        self.taught = model.set_reference(lesson.cloud)
+        self.reference = TaughtSurface(self.taught)
+        self.surface = self.reference.surface
+        self._lines: dict[tuple[str, int], tuple[TaughtLine, ...]] = {}
+
+    def transfer(
+        self,
+        target: PointCloud,
+        unit: str | None = None,
+        min_confidence: float = MIN_CONFIDENCE,
+    ) -> Transferred:
+        """Find the regions on a target, and bring every process there.
+
+        unit: of the target, where its file did not say. A region that is found nowhere, or with
+        less mean confidence than `min_confidence`, is skipped; a process that does not fit its
+        region there is left out with the reason. Raises CloudError for a target that cannot be
+        used, ProcessError for one whose unit nothing tells.
+        """
+        category = self.lesson.knowledge.category
+        target = in_metres(target, known_unit(target, unit, category, "the target", "unit"))
+        start = time.perf_counter()
+        embedded = self.model.embed(target)
+        matches = self.taught.retrieve_all(self.lesson.regions, embedded)
+        found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
+        seconds = {"regions": time.perf_counter() - start}
+        start = time.perf_counter()
+        way = Correspondence(self.reference, embedded)
+        seconds["surface"] = time.perf_counter() - start
+        start = time.perf_counter()
+        paths = tuple(
+            self._path(name, number, process, found[name], way)
+            for name, number, process in self.steps()
+        )
+        seconds["tool paths"] = time.perf_counter() - start
+        shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
+        skipped = [
+            f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
+        ]
+        warnings = (*skipped, *(line.split(";")[0] for line in shared))
+        return Transferred(self.lesson, with_normals(embedded), found, paths, warnings, seconds)
+
+    def steps(self) -> list[tuple[str, int, Process]]:
+        """Every process with its region and number there, in the order in which they are done."""
+        steps = [
+            (region.name, number, process)
+            for region in self.lesson.knowledge.regions
+            for number, process in enumerate(region.processes)
+        ]
+        return sorted(steps, key=lambda step: step[2].order)
+
+    def lines(self, region: str, number: int) -> tuple[TaughtLine, ...]:
+        """The lines on the reference of a process: as taught, or planned there."""
+        if (region, number) not in self._lines:
+            process = self._process(region, number)
+            if process.waypoints is not None:
+                lines = taught_lines(process, self.surface)
+            else:
+                inside = working(self.taught.reference, self.lesson.regions[region])
+                once = replace(strategy_of(process), passes=1)
+                segments = plan(self.surface, inside, once)
+                lines = tuple(
+                    TaughtLine(s.positions, s.quaternions_xyzw) for s in segments
+                    if s.kind == "process"
+                )  # fmt: skip
+            self._lines[region, number] = lines
+        return self._lines[region, number]
+
+    def contacts(self, region: str, number: int) -> list[np.ndarray]:
+        """The places (n, 3) on the reference's surface that each line of a process works."""
+        height = self._process(region, number).standoff_m
+        lines = self.lines(region, number)
+        return [touched(line.positions, line.quaternions_xyzw, height) for line in lines]
+
+    def _process(self, region: str, number: int) -> Process:
+        named = {r.name: r for r in self.lesson.knowledge.regions}
+        return named[region].processes[number]
+
+    def _path(
+        self, region: str, number: int, process: Process, found: FoundRegion, way: Correspondence
+    ) -> TransferredPath:
+        made = TransferredPath(region, number, process, process.way)
+        if found.missing:
+            return replace(made, reason=found.missing)
+        inside = working(way.embedded, found.match.indices)
+        if process.direction is not None:
+            direction = way.direction(self.lesson.regions[region], np.array(process.direction))
+            process = process.model_copy(update={"direction": tuple(direction.tolist())})
+        strategy = strategy_of(process)
+        warnings: tuple[str, ...] = ()
+        try:
+            if process.way == "replan":
+                segments = plan(way.target, inside, strategy)
+            else:
+                process, segments, warnings = self._carry(region, number, process, way)
+            figures = measure(way.target, inside, strategy, segments)
+        except ProcessError as error:
+            return replace(made, process=process, reason=str(error))
+        path = tool_path(region, process, segments)
+        return replace(made, process=process, path=path, measures=figures, warnings=warnings)
+
+    def _carry(
+        self, region: str, number: int, process: Process, way: Correspondence
+    ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
+        lines = self.lines(region, number)
+        carried, lost = way.carry(lines, process.tool.radius_m)
+        total = sum(len(line.positions) for line in lines)
+        if not carried:
+            raise ProcessError(f"none of the {total} waypoints has a place on the target")
+        warnings = (f"{lost} of {total} waypoints have no place on the target",) if lost else ()
+        drawn = [(line.positions, line.quaternions_xyzw) for line in carried]
+        normals = [line.normals for line in carried]
+        segments = drive(drawn, normals, strategy_of(process))
+        waypoints = [Line(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn]
+        changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
+        return process.model_copy(update=changes), segments, warnings
+
+
+def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
+    """The places (n, 3) that tools at positions (n, 3), some height over a surface, point at."""
+    along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
+    return np.asarray(positions + standoff_m * along)
+
+
+def with_normals(embedded: Embedded) -> PointCloud:
+    """The whole cloud with the normals that the field works with."""
+    if embedded.cloud.normals is not None:
+        return embedded.cloud
+    normals = embedded.original_normals(embedded.normals)
+    return replace(embedded.cloud, normals=normals[embedded.nearest_working])
+
+
+def working(embedded: Embedded, indices: np.ndarray) -> np.ndarray:
+    """Indices of a cloud's points as indices of the points that the field works on."""
+    inside = np.zeros(len(embedded.cloud), bool)
+    inside[indices] = True
+    return np.flatnonzero(inside[embedded.working])
+
+
+def _missing(match: Match, min_confidence: float) -> str:
+    if match.presence.reason:
+        return f"{match.presence.reason} (confidence {match.presence.confidence:.2f})"
+    if not len(match.indices):
+        return "found nowhere on the target"
+    if match.score < min_confidence:
+        return f"confidence {match.score:.2f}, below {min_confidence:g}"
+    return ""

@@ -1,0 +1,91 @@
+"""A cloud as a field sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+from nrdf.cloud import PointCloud
+from nrdf.geometry import thin
+from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.similarity import Similarity
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
+
+    cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
+    canonical. pose: from canonical coordinates to the cloud's. z: (1, d_z). seconds: time of each
+    phase.
+    """
+
+    cloud: PointCloud
+    working: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    pose: Similarity
+    z: torch.Tensor
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def original(self, points_canonical: np.ndarray) -> np.ndarray:
+        """Canonical points (m, 3) in the cloud's own frame and unit."""
+        return self.pose.to_scan(np.asarray(points_canonical, np.float64))
+
+    def canonical(self, points: np.ndarray) -> np.ndarray:
+        """Points (m, 3) of the cloud's own frame and unit in canonical coordinates."""
+        return self.pose.to_canonical(points)
+
+    def original_normals(self, normals_canonical: np.ndarray) -> np.ndarray:
+        """Canonical directions (m, 3) in the cloud's own frame."""
+        return normals_canonical @ self.pose.rotation.T
+
+    def canonical_normals(self, normals: np.ndarray) -> np.ndarray:
+        """Directions (m, 3) of the cloud's own frame in the canonical one."""
+        return normals @ self.pose.rotation
+
+    def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Selected working points as indices of the whole cloud, and which working point each
+        follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
+        """
+        index = np.flatnonzero(selected[self.nearest_working])
+        return index, self.nearest_working[index]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether every point of the cloud is in use."""
+        return len(self.working) == len(self.cloud.points)
+
+    @cached_property
+    def nearest_working(self) -> np.ndarray:
+        """The position in `working` of the point nearest to each point of the cloud."""
+        if self.is_whole:
+            return self.working
+        return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
+
+    def distance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Distance (m,) of canonical points and normals (m, 3) from the working points, in position
+        and weighted normal."""
+        features = oriented_features(points, normals, NORMAL_WEIGHT)
+        return self._oriented_tree.query(features)[0]
+
+    @cached_property
+    def _oriented_tree(self) -> cKDTree:
+        return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The cloud's own points, for regions that are given as points."""
+        return cKDTree(self.cloud.points)
+
+
+def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the points that the encoder sees: an even subset of `count`, which always holds
+    the extreme points of each axis, so that the embedding knows the bounding box exactly."""
+    chosen = thin(points, count, np.random.default_rng(0))
+    extremes = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
+    return np.union1d(chosen, extremes)

@@ -1,0 +1,79 @@
+"""A box that processes are taught on: what the tests of transfer share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nrdf.cloud import PointCloud
+from nrdf.process.coverage import Measures
+from nrdf.process.knowledge import Knowledge
+from nrdf.process.lesson import Lesson
+from nrdf.process.strategy import tool_path
+from nrdf.process.toolpath import Segment
+from nrdf.process.transfer import FoundRegion, Transferred, TransferredPath
+from nrdf.regions.match import Match
+from solids import box
+
+SIZE = np.array([0.5, 0.6, 0.9])
+POINTS = 3000
+SAND = {
+    "kind": "sand", "stepover_mm": 40, "spacing_mm": 20, "tool": {"radius_mm": 25},
+    "force_n": 10, "feed_mm_s": 100,
+}  # fmt: skip
+
+
+def cloud(size=SIZE, count=POINTS, seed=0):
+    points, normals = box(size, count, seed)
+    return PointCloud(points, normals, unit="m")
+
+
+def faces(of):
+    """Indices of a box's points by face."""
+    normals = of.normals
+    return {
+        "top": np.flatnonzero(normals[:, 1] > 0.5),
+        "front": np.flatnonzero(normals[:, 0] > 0.5),
+        "right": np.flatnonzero(normals[:, 2] > 0.5),
+    }
+
+
+MEASURES = Measures(
+    coverage=0.995,
+    overlap=0.4,
+    line_spacing_mean_m=0.04,
+    line_spacing_worst_m=0.042,
+    surface_distance_worst_m=0.0009,
+    surface_distance_99_m=0.0004,
+    axis_error_99_rad=0.01,
+    path_length_m=5.0,
+    process_length_m=4.0,
+    cycle_time_s=50.0,
+)
+
+
+def made_up(confidence=0.8, measures=MEASURES, missing="", reason="", **changes):
+    """A transfer of one process, of these figures, that nobody planned."""
+    taught = lesson({"top": [{**SAND, **changes}]})
+    (process,) = taught.knowledge.regions[0].processes
+    match = Match(taught.regions["top"], np.zeros((0, 3)), np.full(100, confidence), "mask")
+    line = taught.cloud.points[taught.regions["top"]][:5]
+    held = np.tile([1.0, 0.0, 0.0, 0.0], (5, 1))
+    segment = Segment("process", 0, line, held, process.feed_m_s, process.force_n)
+    path = None if missing or reason else tool_path("top", process, [segment])
+    step = TransferredPath(
+        "top", 0, process, process.way, path, measures if path else None, (), missing or reason
+    )
+    regions = {"top": FoundRegion("top", match, missing)}
+    return Transferred(taught, taught.cloud, regions, (step,), (), {"regions": 0.3})
+
+
+def lesson(processes, reference=None, **changes):
+    """Knowledge of processes by face, on a box."""
+    reference = cloud() if reference is None else reference
+    regions = {name: faces(reference)[name] for name in processes}
+    rows = [
+        {"name": name, "indices": regions[name].tolist(), "processes": given}
+        for name, given in processes.items()
+    ]
+    content = {"category": "chair", "reference": {"cloud": "box.ply"}, "regions": rows, **changes}
+    return Lesson(Knowledge.model_validate(content), reference, regions)

@@ -1,0 +1,140 @@
+"""`nrdf knowledge`, `nrdf transfer` and what follows, as a user types them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nrdf import cli
+from nrdf.cloud import PointCloud, write_cloud
+from nrdf.process.knowledge_file import read_knowledge
+from nrdf.process.toolpath import read_job
+from taught_box import SIZE, cloud, faces
+
+
+@pytest.fixture
+def files(tmp_path):
+    """box.ply, top.ply, front.ply, and new.ply in millimetres."""
+    whole = cloud()
+    write_cloud(tmp_path / "box.ply", whole)
+    for name in ("top", "front"):
+        write_cloud(tmp_path / f"{name}.ply", whole.select(faces(whole)[name]))
+    other = cloud(SIZE, seed=1)
+    write_cloud(tmp_path / "new.ply", PointCloud(1000 * other.points, other.normals, "mm", "cell"))
+    return tmp_path
+
+
+@pytest.fixture
+def taught(files):
+    words = f"knowledge new --reference {files}/box.ply --category chair --region {files}/top.ply "
+    words += f"{files}/front.ply --kind sand oil --out {files}/box.yaml"
+    assert cli.run(words.split()) == 0
+    return files
+
+
+def transfer(files, model, *more):
+    words = f"transfer {files}/box.yaml --model {model} --target {files}/new.ply --out {files}/job"
+    return cli.run([*words.split(), *more])
+
+
+def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
+    assert cli.run(["knowledge", "check", str(taught / "box.yaml")]) == 0
+    said = capsys.readouterr().out
+    assert "2 processes on 2 regions: nothing is wrong" in said and "30 mm" in said
+    assert transfer(taught, untrained, "--min-coverage", "0.5", "--require-all") == 0
+    said = capsys.readouterr().out
+    assert "2 tool paths" in said and "top" in said and "oil" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert report["limits"]["set"] == {"min_coverage": 0.5, "require_all": True}
+    assert report["model"]["category"] == "chair" and report["versions"]["nrdf"]
+    job = read_job(taught / "job")
+    assert job.frame == "cell" and [path.process for path in job.paths] == ["sand", "oil"]
+    assert max(abs(s.positions).max() for path in job.paths for s in path.segments) < 1.0
+    assert cli.run(["export", str(taught / "job"), "--format", "urscript", "csv"]) == 0
+    assert cli.run(["knowledge", "check", str(taught / "job" / "knowledge.yaml")]) == 0
+
+
+def test_a_limit_that_is_not_met_ends_with_3_after_writing(taught, untrained, capsys):
+    limits = ("--max-line-spacing-mm", "1", "--max-cycle-time-s", "2")
+    assert transfer(taught, untrained, *limits) == 3
+    said = capsys.readouterr().err
+    assert "limits not met:" in said and "above 1 mm" in said and "above 2 s" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert len(report["limits"]["not_met"]) == 3
+    assert (taught / "job" / "toolpaths.json").exists()
+
+
+def test_a_region_without_enough_confidence_is_skipped(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--min-confidence", "1.01") == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "region 'top' is skipped: confidence" in said and "below 1.01" in said
+    assert not (taught / "job" / "toolpaths.json").exists()
+    limits = ("--min-confidence", "1.01", "--require-all", "--overwrite")
+    assert transfer(taught, untrained, *limits) == 3
+
+
+def test_a_placeholder_says_what_to_do(files, capsys):
+    words = f"knowledge new --reference {files}/box.ply --category chair --out {files}/box.yaml"
+    assert cli.run(words.split()) == 0
+    assert "my-region.ply" in capsys.readouterr().out
+    assert cli.run(["knowledge", "check", str(files / "box.yaml")]) == 2
+    assert "region 'my-region': cannot read" in capsys.readouterr().err
+    assert cli.run(words.split()) == 2
+    assert "exists; give another name, or --overwrite" in capsys.readouterr().err
+    assert cli.run([*words.split(), "--overwrite"]) == 0
+
+
+def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
+    path = taught / "box.yaml"
+    path.write_text(path.read_text().replace("edge_margin_m: 0.01", "edge_margin_m: 0.4", 1))
+    assert cli.run(["knowledge", "check", str(path)]) == 2
+    said = capsys.readouterr()
+    assert "region 'top', sand: edge_margin_m is 0.4, which leaves nothing" in said.err
+    assert "asked for" in said.out and "nothing is wrong" not in said.out
+
+
+def test_json_and_its_schema(taught, tmp_path, capsys):
+    words = f"knowledge new --reference {taught}/box.ply --category chair --out {taught}/box.json"
+    assert cli.run([*words.split(), "--region", str(taught / "top.ply")]) == 0
+    assert json.loads((taught / "box.json").read_text())["version"] == 1
+    assert read_knowledge(taught / "box.json").regions[0].name == "top"
+    capsys.readouterr()
+    assert cli.run(["knowledge", "schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert schema["properties"]["regions"] and "2020-12" in schema["$schema"]
+    assert cli.run(["knowledge", "schema", "--out", str(tmp_path / "s.json")]) == 0
+    assert json.loads((tmp_path / "s.json").read_text()) == schema
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("feed_m_s: 0.1 ", "feed_m_s: 0 "), "process 1 (sand), feed_m_s: must be above 0.0"),
+        (("standoff_m: 0.0", "standoff_m: 0.1"), "a force without contact"),
+        (("version: 1", "version: 9"), "version 9, from a newer nrdf"),
+        (("category:", "catgeory:"), "unknown key 'catgeory'; did you mean 'category'?"),
+        (("sha256: ", "sha256: 0000"), "reference.sha256"),
+        (("category: chair", "category: table"), "for the category chair"),
+        (("file: top.ply", "file: front.ply"), "regions 'top' and 'front' overlap"),
+    ],
+)
+def test_bad_knowledge_is_explained_and_leaves_nothing(taught, untrained, capsys, change, message):
+    path = taught / "box.yaml"
+    text = path.read_text()
+    assert change[0] in text
+    path.write_text(text.replace(*change, 1))
+    assert transfer(taught, untrained) == 2
+    said = capsys.readouterr().err
+    assert message in said and "Traceback" not in said
+    assert not (taught / "job").exists()
+
+
+def test_the_targets_unit_is_asked_for_where_nothing_tells_it(taught, untrained, capsys):
+    write_cloud(taught / "new.ply", PointCloud(7 * cloud(seed=1).points))
+    assert transfer(taught, untrained) == 2
+    assert "give --unit (m, cm, mm, in)" in capsys.readouterr().err
+    assert transfer(taught, untrained, "--unit", "in") == 0
+    write_cloud(taught / "new.ply", PointCloud(cloud(seed=1).points, unit="m"))
+    assert transfer(taught, untrained, "--unit", "mm", "--overwrite") == 2
+    assert "--unit is mm, but the file says m" in capsys.readouterr().err

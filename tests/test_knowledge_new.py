@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nrdf.cloud import PointCloud, write_cloud
+from nrdf.errors import ProcessError, RegionError
+from nrdf.process.knowledge_check import check
+from nrdf.process.knowledge_file import read_knowledge, write_knowledge
+from nrdf.process.knowledge_new import KINDS, PLACEHOLDER, new_knowledge
+from nrdf.process.lesson import checksum, read_lesson
+from taught_box import cloud, faces
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A reference and two of its regions in a folder beside the one for the knowledge file."""
+    (tmp_path / "scans").mkdir()
+    whole = cloud()
+    write_cloud(tmp_path / "scans" / "box.ply", whole)
+    for name in ("top", "front"):
+        write_cloud(tmp_path / f"{name}.ply", whole.select(faces(whole)[name]))
+    return tmp_path
+
+
+def new(files, *regions, kinds=("sand",), **options):
+    paths = [files / f"{name}.ply" for name in regions]
+    return new_knowledge(files / "scans" / "box.ply", "chair", files, paths, kinds, **options)
+
+
+def test_a_new_file_passes_the_check_once_its_placeholder_is_filled_in(files):
+    path = files / "box.yaml"
+    write_knowledge(path, new(files), explained=True)
+    assert path.read_text().startswith("# Process knowledge")
+    with pytest.raises(ProcessError, match=rf"region '{PLACEHOLDER}': cannot read .*{PLACEHOLDER}"):
+        read_lesson(path)
+    (files / "top.ply").rename(files / f"{PLACEHOLDER}.ply")
+    (row,) = check(read_lesson(path))
+    assert row.fault == "" and row.measures.coverage > 0.9
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_has_values_that_make_sense(files, kind):
+    write_knowledge(files / "box.yaml", new(files, "top", kinds=[kind]), explained=True)
+    (row,) = check(read_lesson(files / "box.yaml"))
+    assert row.process.kind == kind and row.fault == ""
+    assert not [line for line in row.warnings if "force_n" in line or "stripes" in line]
+
+
+def test_regions_are_filled_in_and_the_reference_is_sealed(files):
+    knowledge = new(files, "top", "front", kinds=["sand", "paint"])
+    assert knowledge.reference.cloud == "scans/box.ply"
+    assert knowledge.reference.sha256 == checksum(files / "scans" / "box.ply")
+    assert knowledge.reference.unit is None  # the file says it
+    rows = [(r.name, r.file, r.processes[0].kind) for r in knowledge.regions]
+    assert rows == [("top", "top.ply", "sand"), ("front", "front.ply", "paint")]
+
+
+def test_a_unit_is_written_where_the_file_does_not_say_it(files):
+    write_cloud(files / "scans" / "box.ply", PointCloud(cloud().points * 1000))
+    assert new(files).reference.unit == "mm"
+    assert new(files, unit="m").reference.unit == "m"
+
+
+def test_several_regions_in_one_file(files):
+    np.savez(files / "both.npz", top=faces(cloud())["top"], front=faces(cloud())["front"])
+    path = files / "both.npz"
+    knowledge = new_knowledge(files / "scans" / "box.ply", "chair", files, [path])
+    assert [region.name for region in knowledge.regions] == ["top", "front"]
+    write_knowledge(files / "k.json", knowledge)
+    assert read_knowledge(files / "k.json") == knowledge
+
+
+def test_mistakes_are_explained(files):
+    with pytest.raises(ProcessError, match="no process kind 'sandd'; known: sand, polish"):
+        new(files, kinds=["sandd"])
+    with pytest.raises(ProcessError, match="3 kinds for 2 regions; give one for each, or one for"):
+        new(files, "top", "front", kinds=["sand", "oil", "oil"])
+    with pytest.raises(ProcessError, match="two regions are called 'top'"):
+        new(files, "top", "top")
+    write_cloud(files / "off.ply", PointCloud(cloud().points[:9] + 5))
+    with pytest.raises((ProcessError, RegionError), match="'off': 9 of the region's 9 points are"):
+        new(files, "off")

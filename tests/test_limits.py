@@ -1,0 +1,41 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from nrdf.process.limits import Limits
+from taught_box import MEASURES, made_up
+
+
+@pytest.mark.parametrize(
+    ("limit", "good", "bad", "message"),
+    [
+        ("min_coverage", 0.99, 0.999, "the coverage is 0.995, below 0.999"),
+        ("max_line_spacing_m", 0.045, 0.041, "worst line spacing is 42 mm, above 41 mm"),
+        ("max_surface_distance_m", 0.001, 0.0005, "from the surface is 0.9 mm, above 0.5 mm"),
+        ("max_axis_error_rad", 0.02, 0.005, "(99th percentile) is 0.573°, above 0.2865°"),
+        ("max_cycle_time_s", 60.0, 40.0, "the cycle time is 50.0 s, above 40 s"),
+    ],
+)
+def test_each_limit_is_met_or_says_by_how_much_it_is_not(limit, good, bad, message):
+    assert Limits(**{limit: good}).broken(made_up()) == []
+    (line,) = Limits(**{limit: bad}).broken(made_up())
+    assert message in line
+    assert limit == "max_cycle_time_s" or line.startswith("region 'top', sand: ")
+
+
+def test_no_limit_is_always_met():
+    assert Limits().broken(made_up(measures=replace(MEASURES, coverage=0.0))) == []
+
+
+def test_what_has_no_path_counts_only_where_all_are_required():
+    skipped = made_up(missing="found nowhere on the target")
+    assert Limits(min_coverage=1.0, max_cycle_time_s=1.0).broken(skipped) == []
+    (line,) = Limits(require_all=True).broken(skipped)
+    assert line == "region 'top', sand: there is no tool path: found nowhere on the target"
+
+
+def test_a_single_line_has_no_spacing_to_be_too_wide():
+    alone = made_up(measures=replace(MEASURES, line_spacing_worst_m=None))
+    assert Limits(max_line_spacing_m=0.001).broken(alone) == []

@@ -1,0 +1,165 @@
+"""Transfer from a box to a box: an untrained field knows that one is the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nrdf
+from nrdf.cloud import PointCloud, write_cloud
+from nrdf.errors import ModelError
+from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.transfer import Teacher, working
+from taught_box import SAND, SIZE, cloud, faces, lesson
+
+OIL = {**SAND, "kind": "oil", "order": -1, "parameters": {"oil": "linseed"}}
+TAUGHT = {
+    **SAND, "name": "seam", "trajectory": "taught",
+    "waypoints": [{"positions_m": [[0.25, 0.1, z] for z in np.linspace(-0.3, 0.3, 13).tolist()]}],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model(untrained):
+    return nrdf.load_model(untrained)
+
+
+@pytest.fixture(scope="module")
+def transferred(model):
+    taught = lesson({"top": [SAND, {**SAND, "transfer": "carry", "passes": 2}],
+                     "right": [OIL], "front": [TAUGHT]})  # fmt: skip
+    return Teacher(taught, model).transfer(cloud(seed=1))
+
+
+def process_segments(step):
+    return [segment for segment in step.path.segments if segment.kind == "process"]
+
+
+def test_processes_come_in_their_order(transferred):
+    steps = [(step.region, step.number, step.process.label) for step in transferred.paths]
+    assert steps == [("right", 0, "oil"), ("top", 0, "sand"), ("top", 1, "sand"),
+                     ("front", 0, "seam")]  # fmt: skip
+    assert all(step.path is not None and not step.reason for step in transferred.paths)
+    assert set(transferred.seconds) == {"regions", "surface", "tool paths"}
+
+
+def test_regions_are_those_of_the_target(transferred):
+    truth = faces(transferred.target)
+    for name, region in transferred.regions.items():
+        assert not region.missing
+        common = np.intersect1d(region.match.indices, truth[name])
+        assert len(common) > 0.9 * max(len(region.match.indices), len(truth[name]))
+
+
+def test_a_strategy_is_planned_anew_on_the_target(transferred):
+    step = transferred.paths[1]
+    assert step.way == "replan" and step.process.trajectory == "raster"
+    positions = np.concatenate([segment.positions for segment in process_segments(step)])
+    np.testing.assert_allclose(positions[:, 1], SIZE[1] / 2, atol=2e-3)
+    assert step.measures.coverage > 0.9
+    assert (step.path.process, step.path.tool_radius_m) == ("sand", 0.025)
+    assert process_segments(step)[0].force_n == 10
+
+
+def test_a_carried_strategy_has_the_references_lines(transferred):
+    step = transferred.paths[2]
+    assert step.way == "carry" and step.process.trajectory == "taught"
+    assert step.process.transfer is None and step.process.way == "carry"
+    once = len(step.process.waypoints)
+    assert len(process_segments(step)) == 2 * once >= 10
+    first = np.array(step.process.waypoints[0].positions_m)
+    np.testing.assert_allclose(process_segments(step)[0].positions, first)
+
+
+def test_taught_waypoints_are_carried_and_get_their_tools(transferred):
+    step = transferred.paths[3]
+    (segment,) = process_segments(step)
+    given = np.array(TAUGHT["waypoints"][0]["positions_m"])
+    np.testing.assert_allclose(segment.positions, given, atol=0.01)
+    assert step.path.parameters == {} and step.path.process == "seam"
+    kinds = [segment.kind for segment in step.path.segments]
+    assert kinds == ["approach", "process", "departure"]
+
+
+def test_free_parameters_go_along(transferred):
+    assert transferred.paths[0].path.parameters == {"oil": "linseed"}
+
+
+def test_a_direction_is_in_the_targets_frame(model):
+    turned = lesson({"top": [{**SAND, "direction": [0, 0, 1]}]})
+    step = Teacher(turned, model).transfer(cloud(seed=1)).paths[0]
+    assert abs(step.process.direction[2]) > 0.99
+    line = process_segments(step)[1].positions
+    assert np.ptp(line[:, 2]) > 5 * np.ptp(line[:, 0])
+
+
+def test_a_region_that_is_not_there_is_skipped_never_invented(model):
+    taught = Teacher(lesson({"top": [SAND, OIL], "right": [SAND]}), model)
+    result = taught.transfer(cloud(seed=1), min_confidence=1.01)
+    assert all(step.path is None and step.measures is None for step in result.paths)
+    assert "below 1.01" in result.regions["top"].missing
+    assert len(result.warnings) == 2
+    assert result.warnings[0].startswith("region 'top' is skipped: confidence ")
+
+
+def test_a_process_that_does_not_fit_the_target_is_left_out_with_the_reason(model):
+    wide = {**SAND, "edge_margin_mm": 100}
+    small = Teacher(lesson({"top": [wide, SAND]}), model).transfer(cloud(SIZE / 4, seed=1))
+    assert small.paths[0].path is None
+    assert "edge_margin_m is 0.1" in small.paths[0].reason
+    assert small.paths[1].path is not None
+
+
+def test_waypoints_off_the_reference_are_named(model):
+    far = {**TAUGHT, "waypoints": [{"positions_m": [[0.25, 0.1, 0.0], [0.45, 0.1, 0.0]]}]}
+    step = Teacher(lesson({"front": [far]}), model).transfer(cloud(seed=1)).paths[0]
+    assert "number 2 of line 1 is 1" in step.reason and "standoff_m 0" in step.reason
+
+
+def test_regions_that_overlap_on_the_target_are_said(model):
+    reference = cloud()
+    taught = lesson({"top": [SAND], "right": [SAND]}, reference, allow_overlap=True)
+    both = np.union1d(taught.regions["right"], taught.regions["top"])
+    changed = {**taught.regions, "right": both}
+    taught = type(taught)(taught.knowledge, reference, changed)
+    result = Teacher(taught, model).transfer(cloud(seed=1))
+    assert any("regions 'top' and 'right' overlap" in line for line in result.warnings)
+
+
+def test_a_model_of_another_category_is_refused(model):
+    table = lesson({"top": [SAND]}, category="table")
+    with pytest.raises(ModelError, match="for the category chair, but the knowledge is about"):
+        Teacher(table, model)
+
+
+def test_normals_are_estimated_for_all_points_and_kept(model):
+    whole = cloud(seed=1)
+    result = Teacher(lesson({"top": [SAND]}), model).transfer(PointCloud(whole.points))
+    facing = np.einsum("na,na->n", result.target.normals, whole.normals)
+    assert np.quantile(facing, 0.2) > 0.9
+    assert result.paths[0].measures.coverage > 0.9
+
+
+def test_a_target_in_another_unit_is_brought_to_metres(model):
+    there = cloud(seed=1)
+    far = PointCloud(1000 * there.points + 5000, there.normals, unit="mm", frame="cell")
+    result = Teacher(lesson({"top": [SAND]}), model).transfer(far)
+    assert (result.target.unit, result.target.frame) == ("m", "cell")
+    positions = np.concatenate([s.positions for s in process_segments(result.paths[0])])
+    np.testing.assert_allclose(positions[:, 1], 5 + SIZE[1] / 2, atol=5e-3)
+
+
+def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
+    write_cloud(tmp_path / "box.ply", cloud())
+    write_knowledge(tmp_path / "box.yaml", lesson({"top": [SAND]}).knowledge)
+    teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
+    teacher.transfer(cloud(seed=1)).write(tmp_path / "job")
+    assert (tmp_path / "job" / "report.html").exists()
+    assert teacher.lesson.knowledge.regions[0].name == "top"
+
+
+def test_points_in_use_are_found_again(model):
+    embedded = model.embed(cloud(count=20_000))
+    some = np.arange(0, 20_000, 3)
+    found = working(embedded, some)
+    np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
