@@ -65,7 +65,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
-    **dict.fromkeys(("Match", "Model", "Taught"), "nrdf.regions.model"),
+    "Match": "nrdf.regions.match",
+    **dict.fromkeys(("Model", "Taught"), "nrdf.regions.model"),
     **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),

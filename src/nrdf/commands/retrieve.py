@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from nrdf.cloud import PointCloud
     from nrdf.picture import Panel
-    from nrdf.regions.match import Match
     from nrdf.regions.embedded import Embedded
+    from nrdf.regions.match import Match
 
 log = logging.getLogger(__name__)
 
