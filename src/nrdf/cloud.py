@@ -12,6 +12,7 @@ import numpy as np
 from nrdf import ply
 from nrdf.errors import CloudError
 from nrdf.formats import reader_of
+from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
 
@@ -128,6 +129,13 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
         logger.warning("%s: some normals are zero or not finite; all are left out", path)
         return replace(cloud, normals=None)
     return replace(cloud, normals=cloud.normals / length)
+
+
+def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
+    """The cloud, whose coordinates are in `unit`, in metres."""
+    length = METRES[unit]
+    sensors = None if cloud.sensors is None else cloud.sensors * length
+    return replace(cloud, points=cloud.points * length, sensors=sensors, unit="m")
 
 
 def check_cloud(cloud: PointCloud, minimum_points: int) -> None:

@@ -79,6 +79,7 @@ def align(
 
         loaded = nrdf.load_model(model, device)
         found = read_scan(loaded, scan, up, sensor, unit, skip, topic)
+        warn_of_doubts(found, scan)
         best, cleaned = found.alignment.best, found.cleaned
         points = best.pose.to_canonical(cleaned.cloud.points)
         nrdf.write_cloud(folder / "aligned.ply", PointCloud(points, frame=loaded.category))
@@ -106,7 +107,7 @@ def read_scan(
     skip: tuple[str, ...] = (),
     topic: str | None = None,
 ) -> AlignedScan:
-    """Read, clean and align a scan by a command's options; every doubt is a warning.
+    """Read, clean and align a scan by a command's options.
 
     Raises CloudError for options without sense, an unreadable scan, or one without an object.
     """
@@ -125,10 +126,13 @@ def read_scan(
     places = np.array(sensor, float).reshape(-1, 3) if sensor else None
     direction = None if up == "auto" else up_axis(up)
     cloud = read_cloud(path, topic=topic)
-    found = bring_in(Judge(model), cloud, direction, places, unit, skip)
+    return bring_in(Judge(model), cloud, direction, places, unit, skip)
+
+
+def warn_of_doubts(found: AlignedScan, path: Path) -> None:
+    """Log every doubt about a scan as a warning."""
     for doubt in found.doubts:
         log.warning("%s: %s", path, doubt)
-    return found
 
 
 def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:

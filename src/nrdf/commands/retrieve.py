@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan
+from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, warn_of_doubts
 from nrdf.commands.console import (
     command_line,
     console,
@@ -104,6 +104,7 @@ def retrieve(
             target_cloud = nrdf.read_cloud(target, topic=topic)
         else:
             scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+            warn_of_doubts(scan, target)
             target_cloud, doubts = scan.scan, scan.doubts
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
+from nrdf.cloud import PointCloud, in_metres
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
-from nrdf.units import Unit, find_unit
+from nrdf.similarity import Similarity
+from nrdf.units import METRES, Unit, find_unit
 
 _FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
 _MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
@@ -33,6 +34,13 @@ class AlignedScan:
         """The object as the model's field sees it, in the likeliest pose."""
         best = self.alignment.best
         return self.judge.model.embed(self.cleaned.cloud, best.pose, best.symmetry > _MIRRORED)
+
+    def embed_in_metres(self, unit: str) -> Embedded:
+        """As `embed`, of the object in metres, its scan being in `unit`."""
+        best = self.alignment.best
+        pose = best.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
+        cloud = in_metres(self.cleaned.cloud, unit)
+        return self.judge.model.embed(cloud, pose, best.symmetry > _MIRRORED)
 
     def in_scan(self, match: Match) -> Match:
         """A match on the object, its indices those of the scan's points."""
