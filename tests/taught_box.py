@@ -11,7 +11,7 @@ from nrdf.process.lesson import Lesson
 from nrdf.process.strategy import tool_path
 from nrdf.process.toolpath import Segment
 from nrdf.process.transfer import FoundRegion, Transferred, TransferredPath
-from nrdf.regions.model import Match
+from nrdf.regions.match import Match
 from solids import box
 
 SIZE = np.array([0.5, 0.6, 0.9])

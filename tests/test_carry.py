@@ -10,7 +10,7 @@ import nrdf
 from nrdf.process.carry import Correspondence, TaughtSurface
 from nrdf.process.frames import tool_quaternions
 from nrdf.process.taught import TaughtLine
-from nrdf.regions.model import Mapped
+from nrdf.regions.match import Mapped
 from taught_box import SIZE, cloud, faces
 
 SCALE = np.array([1.3, 0.8, 1.1])
@@ -27,7 +27,7 @@ def taught_on(model, reference, scale):
     taught = model.set_reference(reference)
 
     def places(points, normals, target):
-        there = (points * scale - target.centre) / target.scale
+        there = target.canonical(points * scale)
         count = len(points)
         return Mapped(there, normals, np.ones(count), np.zeros(count), np.zeros((count, 3)))
 

@@ -60,6 +60,10 @@ GOOD = {
     "a.obj": b"# points\n" + "".join(f"v {line}\n" for line in TEXT.splitlines()).encode(),
     "ascii.pcd": b"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\n"
     b"COUNT 1 1 1\nWIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA ascii\n" + TEXT.encode(),
+    "compressed.pcd": b"VERSION .7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 4\nHEIGHT 1\n"
+    b"POINTS 4\nDATA binary_compressed\n"
+    + struct.pack("<II", 96 + 3, 96)
+    + b"".join(bytes([31]) + POINTS.T.astype("<f8").tobytes()[i : i + 32] for i in (0, 32, 64)),
     "binary.pcd": b"VERSION .7\nFIELDS rgb x y z\nSIZE 4 8 8 8\nTYPE U F F F\n"
     b"WIDTH 4\nHEIGHT 1\nPOINTS 4\nDATA binary\n"
     + b"".join(struct.pack("<I3d", 9, *row) for row in POINTS),
@@ -175,7 +179,12 @@ BAD = {
     "compressed pcd": (
         "a.pcd",
         b"VERSION 7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n",
-        "DATA binary",
+        "nothing follows",
+    ),
+    "pcd of a new kind": (
+        "a.pcd",
+        b"VERSION 7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA zipped\n",
+        "known: ascii, binary, binary_compressed",
     ),
     "truncated pcd": (
         "a.pcd",

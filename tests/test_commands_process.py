@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from nrdf import cli
@@ -53,6 +54,25 @@ def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
     assert max(abs(s.positions).max() for path in job.paths for s in path.segments) < 1.0
     assert cli.run(["export", str(taught / "job"), "--format", "urscript", "csv"]) == 0
     assert cli.run(["knowledge", "check", str(taught / "job" / "knowledge.yaml")]) == 0
+
+
+def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, capsys):
+    turned = cloud(SIZE, seed=1)
+    points = 1000 * turned.points[:, [2, 0, 1]] + [3000.0, 0.0, 300.0]
+    scan = PointCloud(points, turned.normals[:, [2, 0, 1]], None, "cell")
+    write_cloud(taught / "new.ply", scan)
+    assert transfer(taught, untrained, "--up", "z", "--skip", "floor") == 0
+    assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert report["alignment"]["unit"] == {"name": "mm", "origin": "guessed"}
+    sand = next(path for path in read_job(taught / "job").paths if path.process == "sand")
+    heights = [s.positions[:, 2] for s in sand.segments if s.kind == "process"]
+    assert np.abs(np.concatenate(heights) - 0.6).max() < 0.01
+
+
+def test_scan_options_need_up(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--skip", "floor") == 2
+    assert "--sensor and --skip are for scans: give --up" in capsys.readouterr().err
 
 
 def test_a_limit_that_is_not_met_ends_with_3_after_writing(taught, untrained, capsys):

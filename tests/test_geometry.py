@@ -2,6 +2,7 @@ import time
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +15,7 @@ from nrdf.geometry import (
     thin,
     visibility,
 )
+from nrdf.scans.simulate import ScanSettings, simulate_scan
 
 
 def sphere(rng, count, radius=0.5):
@@ -188,3 +190,26 @@ def test_visibility_tells_the_outer_side_and_finds_buried_points():
     assert (seen[:6000] >= 10).mean() > 0.999
     assert unseen[:6000].mean() < 1.0
     assert (np.maximum(front, back)[6000:] < 3).mean() > 0.95
+
+
+def test_normals_of_a_partial_cloud_point_to_the_sensors_that_saw_it():
+    bench = trimesh.util.concatenate(
+        [
+            trimesh.creation.box((0.5, 0.03, 0.5)),
+            trimesh.creation.box((0.03, 0.5, 0.5), trimesh.transformations.translation_matrix(
+                (-0.25, 0.25, 0))),
+        ]
+    )  # fmt: skip
+    for views, least in ((1, 0.99), (3, 0.95)):
+        seen = simulate_scan(
+            bench.vertices, bench.faces, ScanSettings(views=views), np.random.default_rng(1)
+        )
+        chosen = thin(seen.cloud.points, 4000, np.random.default_rng(0))
+        away = np.array([5.0, 0.0, 0.0])
+        points, true = seen.cloud.points[chosen] + away, seen.normals[chosen]
+        sensors = seen.cloud.sensors + away
+        cosine = (estimate_normals(points, sensors=sensors) * true).sum(axis=1)
+        assert (cosine > 0.5).mean() > least
+        turned = 1000 * points[:, [1, 2, 0]]
+        moved = estimate_normals(turned, sensors=1000 * sensors[:, [1, 2, 0]])
+        assert ((moved * true[:, [1, 2, 0]]).sum(axis=1) > 0.5).mean() > least

@@ -9,7 +9,9 @@ import torch
 from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError, RegionError
 from nrdf.field import build_field
-from nrdf.regions.model import _TRUST_SCALE, WORKING_POINTS, Model, encoder_subset
+from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.match import TRUST_SCALE
+from nrdf.regions.model import WORKING_POINTS, Model
 from nrdf.shapes.families import get_family
 from solids import box
 
@@ -101,7 +103,7 @@ def test_on_the_reference_itself_regions_are_found_again(taught, reference, meth
         assert overlap(match.indices, masks[name]) > (0.9 if method == "mask" else 0.999)
         np.testing.assert_allclose(match.points, cloud.points[masks[name]], atol=1e-5)
         # existence starts at 3, log error at -3, and the field is right about neither
-        start = 0.9526 * np.exp(-np.exp(-3) / _TRUST_SCALE)
+        start = 0.9526 * np.exp(-np.exp(-3) / TRUST_SCALE)
         assert start * 0.75 < match.score <= start + 1e-3
 
 

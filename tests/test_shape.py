@@ -92,7 +92,7 @@ def test_the_surface_is_where_the_occupancy_is_the_level():
     embedded = model.embed(PointCloud(shape.surface_points, shape.surface_normals))
     for level in (0.75, 0.45):
         vertices, faces = level_set(model, embedded, Settings(level, resolution=48))
-        canonical = (vertices - embedded.centre) / embedded.scale
+        canonical = embedded.canonical(vertices)
         exact = 1 - np.log(level / (1 - level)) / 5.0
         np.testing.assert_allclose(np.linalg.norm(canonical / RADII, axis=1), exact, atol=0.01)
         edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -104,7 +104,7 @@ def test_figures_agree_with_brute_force():
     model = Model(Ellipsoid(steep=3.0, offset=0.7), {})
     found = score_shape(model, shape, Settings(points=300))
     embedded = model.embed(PointCloud(shape.surface_points, shape.surface_normals))
-    queries = (shape.query_points - embedded.centre) / embedded.scale
+    queries = embedded.canonical(shape.query_points)
     guess = 1 / (1 + np.exp(-(3.0 * (1 - np.linalg.norm(queries / RADII, axis=1)) + 0.7)))
     assert found.mse == pytest.approx(np.mean((guess - shape.query_occupancies) ** 2), abs=1e-6)
     cloud = shape.surface_points[np.random.default_rng(0).permutation(500)[:300]]

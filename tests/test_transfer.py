@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import nrdf
 from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import ModelError
+from nrdf.geometry import canonical_transform
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.transfer import Teacher, working
+from nrdf.similarity import Similarity
 from taught_box import SAND, SIZE, cloud, faces, lesson
 
+OFFSET = np.array([3.0, -1.0, 0.5])
 OIL = {**SAND, "kind": "oil", "order": -1, "parameters": {"oil": "linseed"}}
 TAUGHT = {
     **SAND, "name": "seam", "trajectory": "taught",
@@ -29,6 +33,31 @@ def transferred(model):
     taught = lesson({"top": [SAND, {**SAND, "transfer": "carry", "passes": 2}],
                      "right": [OIL], "front": [TAUGHT]})  # fmt: skip
     return Teacher(taught, model).transfer(cloud(seed=1))
+
+
+def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(model, transferred):
+    turn = Rotation.from_rotvec([0.4, -1.1, 0.7])
+    target = cloud(seed=1)
+    moved = PointCloud(turn.apply(target.points) + OFFSET, turn.apply(target.normals), unit="m")
+    centre, scale = canonical_transform(target.points)
+    pose = Similarity(turn.as_matrix(), turn.apply(centre) + OFFSET, scale)
+    job = Teacher(transferred.lesson, model).transfer(model.embed(moved, pose))
+    assert [step.reason for step in job.paths] == ["", "", "", ""]
+    for step, turned in zip(transferred.paths, job.paths, strict=True):
+        if step.way != "carry":  # planning breaks ties of direction by the target's axes
+            continue
+        for segment, there in zip(process_segments(step), process_segments(turned), strict=True):
+            np.testing.assert_allclose(
+                turn.apply(segment.positions) + OFFSET, there.positions, atol=2e-3
+            )
+            apart = Rotation.from_quat(there.quaternions_xyzw).inv() * (
+                turn * Rotation.from_quat(segment.quaternions_xyzw)
+            )
+            assert np.degrees(apart.magnitude().max()) < 3
+    for step in job.paths:
+        positions = np.concatenate([segment.positions for segment in process_segments(step)])
+        back = np.abs(turn.inv().apply(positions - OFFSET))
+        assert (np.abs(back - SIZE / 2).min(axis=1) < 0.01).all()
 
 
 def process_segments(step):

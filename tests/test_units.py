@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from nrdf.units import METRES, guess_unit, in_words, other_names, to_si
+from nrdf.units import METRES, find_unit, guess_unit, in_words, other_names, to_si
 
 
 @pytest.mark.parametrize(
@@ -69,3 +69,40 @@ def test_a_quantity_given_twice_is_refused():
 def test_a_unit_is_guessed_only_where_it_is_the_only_plausible_one(size, category, unit):
     assert guess_unit(size, category) == unit
     assert unit is None or unit in METRES
+
+
+@pytest.mark.parametrize(
+    ("size", "category", "unit"),
+    [
+        (0.9, "chair", "m"),
+        (900, "chair", "mm"),
+        (90, "chair", "cm"),
+        (4.5, "car", "m"),
+        (4500, "car", "mm"),
+        (35, "plane", "m"),
+    ],
+)
+def test_a_unit_is_guessed_from_the_usual_size(size, category, unit):
+    found = find_unit(None, size, category)
+    assert (found.name, found.origin, found.doubt) == (unit, "guessed", "")
+
+
+def test_no_unit_fits_or_nothing_is_known_of_the_category():
+    found = find_unit(None, 1e-6, "chair")
+    assert found.name is None and "in no unit is it 0.4 to 1.6 m" in found.doubt
+    assert find_unit(None, 1.0, "teapot").origin == "unknown"
+
+
+def test_a_given_unit_is_kept_but_doubted_where_it_is_far_off():
+    assert find_unit("mm", 900, "chair").doubt == ""
+    wrong = find_unit("m", 900, "chair")
+    assert wrong.name == "m" and "900 m is not the 0.4 to 1.6 m of a usual chair" in wrong.doubt
+    assert "in mm it would be" in wrong.doubt
+    toy = find_unit("mm", 300, "chair")
+    assert toy.doubt == ""
+
+
+def test_a_guess_between_several_units_is_doubted():
+    found = find_unit(None, 50, "chair")
+    assert (found.name, found.origin) == ("cm", "guessed")
+    assert found.doubt == "a usual chair may be this long in cm or in"

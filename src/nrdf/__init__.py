@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     )
     from nrdf.process.knowledge import Knowledge
     from nrdf.process.transfer import Teacher, Transferred
-    from nrdf.regions.model import Match, Model, Taught
+    from nrdf.regions.match import Match
+    from nrdf.regions.model import Model, Taught
 
 __all__ = [
     "CloudError",
@@ -64,7 +65,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
-    **dict.fromkeys(("Match", "Model", "Taught"), "nrdf.regions.model"),
+    "Match": "nrdf.regions.match",
+    **dict.fromkeys(("Model", "Taught"), "nrdf.regions.model"),
     **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),

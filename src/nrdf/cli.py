@@ -21,8 +21,8 @@ NOTES = """
 Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
 Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
-message that says what to do; 3 where a limit that was set is not met; 130
-after Ctrl-C."""
+message that says what to do; 3 where a limit that was set is not met, or with
+--strict where anything is doubtful; 130 after Ctrl-C."""
 
 RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc", "ablate")
 GROUPS = ("eval", "knowledge")
@@ -32,11 +32,13 @@ GROUPS = ("eval", "knowledge")
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
     from nrdf.commands.ablate import ablate
+    from nrdf.commands.align import align
     from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.export import export
     from nrdf.commands.information import info, zoo
     from nrdf.commands.knowledge import knowledge
     from nrdf.commands.retrieve import retrieve
+    from nrdf.commands.scan import scan
     from nrdf.commands.shapes import boxes, correspond, prepare, synth
     from nrdf.commands.show import demo
     from nrdf.commands.train import train
@@ -44,11 +46,13 @@ def verbs() -> dict[str, Callable[..., Any]]:
 
     return {
         "retrieve": retrieve,
+        "align": align,
         "knowledge": knowledge,
         "transfer": transfer,
         "export": export,
         "demo": demo,
         "info": info,
+        "scan": scan,
         "synth": synth,
         "prepare": prepare,
         "boxes": boxes,

@@ -12,6 +12,7 @@ import numpy as np
 from nrdf import ply
 from nrdf.errors import CloudError
 from nrdf.formats import reader_of
+from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
 
@@ -25,13 +26,17 @@ class PointCloud:
 
     points: (n, 3) float64, finite; normals: (n, 3) float64, unit length, outward, or None;
     unit: "m", "mm", … or None where the file does not say; frame: name of the coordinate frame, or
-    None.
+    None; colours: (n, 3) uint8 or None; intensity: (n,) float32 or None; sensors: (s, 3) float64,
+    where the sensors stood that saw the points, in the same frame and unit, or None if unknown.
     """
 
     points: np.ndarray
     normals: np.ndarray | None = None
     unit: str | None = None
     frame: str | None = None
+    colours: np.ndarray | None = None
+    intensity: np.ndarray | None = None
+    sensors: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         points = np.ascontiguousarray(self.points, dtype=np.float64)
@@ -43,54 +48,79 @@ class PointCloud:
             if normals.shape != points.shape:
                 raise CloudError(f"{normals.shape} normals do not fit {points.shape} points")
             object.__setattr__(self, "normals", normals)
+        if self.colours is not None and np.shape(self.colours) != points.shape:
+            raise CloudError(f"{np.shape(self.colours)} colours do not fit {points.shape} points")
+        if self.intensity is not None and np.shape(self.intensity) != points.shape[:1]:
+            raise CloudError(
+                f"{np.shape(self.intensity)} intensities do not fit {points.shape} points"
+            )
+        if self.sensors is not None:
+            sensors = np.asarray(self.sensors, dtype=np.float64).reshape(-1, 3)
+            object.__setattr__(self, "sensors", sensors if len(sensors) else None)
 
     def __len__(self) -> int:
         return len(self.points)
 
     def select(self, index: np.ndarray) -> PointCloud:
-        """The points at `index`, integers (k,) or a mask (n,), with their normals."""
-        normals = None if self.normals is None else self.normals[index]
-        return replace(self, points=self.points[index], normals=normals)
+        """The points at `index`, integers (k,) or a mask (n,), with all that belongs to them."""
+        owned = {name: getattr(self, name) for name in ("normals", "colours", "intensity")}
+        kept = {name: values[index] for name, values in owned.items() if values is not None}
+        return replace(self, points=self.points[index], **kept)
 
 
-def read_cloud(path: str | Path, mesh_samples: int = 30_000) -> PointCloud:
+def read_cloud(
+    path: str | Path, mesh_samples: int = 30_000, topic: str | None = None
+) -> PointCloud:
     """Point cloud of the file `path`; the format is told from its content and its name's ending.
 
-    A mesh (faces in a PLY, OFF, OBJ or STL file) is sampled: `mesh_samples` points spread evenly
-    over what is visible from outside, always the same ones, with outward normals; its vertices
-    would be a poor cloud. With `mesh_samples` 0 the vertices are taken all the same. Normals in
-    the file are used as they are, brought to unit length; they are left out if some are missing.
-    A PLY comment ``unit mm`` or ``frame name`` sets the unit or the frame.
+    A mesh (faces in a PLY, OFF, OBJ, STL or GLB file) is sampled: `mesh_samples` points spread
+    evenly over what is visible from outside, always the same ones, with outward normals; its
+    vertices would be a poor cloud. With `mesh_samples` 0 the vertices are taken all the same.
+    Normals in the file are used as they are, brought to unit length; they are left out if some are
+    missing.
+    A PLY comment ``unit mm``, ``frame name`` or ``sensor x y z`` (one each) sets the unit, the
+    frame, or where a sensor stood, and so does a PCD file's VIEWPOINT. Of a ROS 2 bag (a folder, or
+    an MCAP or SQLite file) the first cloud of `topic` is read, which may be left out where only one
+    topic has clouds.
 
     Raises CloudError if the file is missing, unreadable, truncated, in no known format, or empty,
     or if 1 % or more of its points have NaN or infinite coordinates; fewer are dropped, with a
-    warning that counts them.
+    warning that counts them. In PCD files and bags such points mean that a pixel measured nothing:
+    any number of them is dropped.
     """
     path = Path(path)
     try:
-        with open(path, "rb") as file:
-            start = file.read(512)
-        if not start:
-            raise CloudError(f"{path}: the file is empty")
-        cloud = PointCloud(**vars(reader_of(path, start)(path, mesh_samples)))
+        start = b""
+        if not (path / "metadata.yaml").is_file():  # else the folder of a bag
+            with open(path, "rb") as file:
+                start = file.read(512)
+            if not start:
+                raise CloudError(f"{path}: the file is empty")
+        raw = reader_of(path, start, topic)(path, mesh_samples)
     except OSError as error:
         raise CloudError(f"cannot read {path}: {error.strerror or error}") from error
-    return _clean(path, cloud)
+    values = vars(raw)
+    gaps = values.pop("gaps")
+    return _clean(path, PointCloud(**values), gaps)
 
 
-def _clean(path: Path, cloud: PointCloud) -> PointCloud:
-    """Drop the few points that are not finite, bring normals to unit length, or refuse."""
+def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
+    """Drop the few points that are not finite (or many, where those are gaps), bring normals to
+    unit length, or refuse."""
     if len(cloud) == 0:
         raise CloudError(f"{path}: the cloud holds no points")
     finite = np.isfinite(cloud.points).all(axis=1)
     missing = int((~finite).sum())
-    if missing >= MOST_DROPPED * len(cloud) and missing:
+    if gaps and missing == len(cloud):
+        raise CloudError(f"{path}: none of its {len(cloud)} points was measured: all are NaN")
+    if missing >= MOST_DROPPED * len(cloud) and missing and not gaps:
         raise CloudError(
             f"{path}: {missing} of {len(cloud)} points have NaN or infinite coordinates; under "
             f"{MOST_DROPPED:.0%} would be dropped: remove them, or export the cloud again"
         )
     if missing:
-        logger.warning("%s: dropped %d points with NaN or infinite coordinates", path, missing)
+        level = logging.INFO if gaps else logging.WARNING
+        logger.log(level, "%s: dropped %d points with NaN or infinite coordinates", path, missing)
         cloud = cloud.select(finite)
     if cloud.normals is None:
         return cloud
@@ -99,6 +129,13 @@ def _clean(path: Path, cloud: PointCloud) -> PointCloud:
         logger.warning("%s: some normals are zero or not finite; all are left out", path)
         return replace(cloud, normals=None)
     return replace(cloud, normals=cloud.normals / length)
+
+
+def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
+    """The cloud, whose coordinates are in `unit`, in metres."""
+    length = METRES[unit]
+    sensors = None if cloud.sensors is None else cloud.sensors * length
+    return replace(cloud, points=cloud.points * length, sensors=sensors, unit="m")
 
 
 def check_cloud(cloud: PointCloud, minimum_points: int) -> None:
@@ -134,13 +171,14 @@ def write_cloud(
 ) -> None:
     """Write `cloud` as binary PLY, all of it or nothing.
 
-    colours: (n, 3) uint8, red, green, blue; scalars: further properties by name, each (n,), for
-    instance ``{"confidence": …}``. Raises OutputError if the file cannot be written, CloudError if
-    an array does not fit or a name is no PLY property name.
+    colours: (n, 3) uint8, red, green, blue, instead of the cloud's own; scalars: further
+    properties by name, each (n,), for instance ``{"confidence": …}``. Raises OutputError if the
+    file cannot be written, CloudError if an array does not fit or a name is no PLY property name.
     """
     columns = {name: cloud.points[:, i] for i, name in enumerate("xyz")}
     if cloud.normals is not None:
         columns |= {f"n{a}": cloud.normals[:, i].astype("f4") for i, a in enumerate("xyz")}
+    colours = cloud.colours if colours is None else colours
     if colours is not None:
         colours = np.asarray(colours)
         if colours.shape != cloud.points.shape or colours.dtype != np.uint8:
@@ -149,6 +187,8 @@ def write_cloud(
                 f"{colours.dtype}"
             )
         columns |= {name: colours[:, i] for i, name in enumerate(("red", "green", "blue"))}
+    if cloud.intensity is not None:
+        scalars = {"intensity": cloud.intensity, **(scalars or {})}
     for name, values in (scalars or {}).items():
         values = np.asarray(values)
         if values.shape != (len(cloud),):
@@ -158,4 +198,6 @@ def write_cloud(
         columns[name] = values.astype("i4" if values.dtype.kind in "bi" else "f4")
     comments = [f"unit {cloud.unit}"] if cloud.unit else []
     comments += [f"frame {cloud.frame}"] if cloud.frame else []
+    if cloud.sensors is not None:
+        comments += ["sensor " + " ".join(f"{v:.9g}" for v in place) for place in cloud.sensors]
     ply.write_rows(Path(path), columns, comments)

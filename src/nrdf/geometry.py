@@ -108,33 +108,49 @@ def _one_per_cell(points: np.ndarray, lowest: np.ndarray, cell: float) -> np.nda
     return first[first >= 0].astype(np.int64) if dense else np.unique(keys, return_index=True)[1]
 
 
-def estimate_normals(points: np.ndarray, neighbours: int = 16, directions: int = 100) -> np.ndarray:
-    """Outward unit normals (n, 3) of a full cloud `points` (n, 3), any unit.
+def estimate_normals(
+    points: np.ndarray,
+    neighbours: int = 16,
+    directions: int = 100,
+    sensors: np.ndarray | None = None,
+) -> np.ndarray:
+    """Outward unit normals (n, 3) of a cloud `points` (n, 3), any unit.
 
     The line of each normal comes from a principal component analysis of `neighbours` nearest
     points; its sign from visibility in orthographic depth images taken from `directions` evenly
-    spread viewpoints, which stand in for hidden-point removal (Katz et al., 2007). The mean
-    direction that a point is seen from keeps the two sides of a thin sheet apart in the
+    spread viewpoints, which stand in for hidden-point removal (Katz et al., 2007). That is for full
+    clouds: of a surface that is open behind, both sides are seen. Where `sensors` (s, 3) is given,
+    in the points' frame and unit, the sign is that of the sensors which can have seen the point.
+
+    The mean direction that a point is seen from keeps the two sides of a thin sheet apart in the
     neighbourhoods, and neighbours on one sheet vote on the sign together. Raises CloudError with
     fewer than 4 points.
     """
     if len(points) < 4:
         raise CloudError(f"normals need at least 4 points, this cloud has {len(points)}")
-    points = ((points - points.mean(axis=0)) / canonical_transform(points)[1]).astype(np.float32)
+    middle, scale = points.mean(axis=0), canonical_transform(points)[1]
+    points = ((points - middle) / scale).astype(np.float32)
     neighbours = min(neighbours, len(points))
     distance, index = _nearest(points, neighbours)
     spacing = _spacing(distance)
     closeness = np.exp(-((distance / (distance[:, neighbours // 2, None] + 1e-12)) ** 2)) + 1e-6
 
-    toward = _seen_from(points, None, fibonacci_directions(directions * 3 // 5), spacing, 0.7)
+    if sensors is None:
+        toward = _seen_from(points, None, fibonacci_directions(directions * 3 // 5), spacing, 0.7)
+    else:
+        sensors = ((np.asarray(sensors) - middle) / scale).astype(np.float32)
+        toward = _seen_by(points, None, sensors, spacing)
     toward /= np.linalg.norm(toward, axis=1, keepdims=True) + 1e-6
     same_side = np.maximum(np.einsum("nka,na->nk", toward[index], toward), 0.01) ** 2
     normals = _principal_normals(points, index, closeness * same_side)
 
-    toward = _seen_from(points, normals, fibonacci_directions(directions), spacing, 0.4)
-    trust = np.linalg.norm(toward, axis=1)
-    trust = np.minimum(trust / (0.2 * directions), 1.0) / (trust + 1e-6)
-    sign = np.einsum("na,na->n", toward, normals) * trust
+    if sensors is None:
+        toward = _seen_from(points, normals, fibonacci_directions(directions), spacing, 0.4)
+        trust = np.linalg.norm(toward, axis=1)
+        toward *= (np.minimum(trust / (0.2 * directions), 1.0) / (trust + 1e-6))[:, None]
+    else:
+        toward = _seen_by(points, normals, sensors, spacing)
+    sign = np.einsum("na,na->n", toward, normals)
     sign = _consensus(sign, points, normals, index, closeness, 0.25 * spacing)
     return np.where(sign < 0.0, -1.0, 1.0)[:, None] * normals.astype(np.float64)
 
@@ -159,6 +175,20 @@ def visibility(
         front += seen & (facing > 0.0)
         back += seen & (facing < 0.0)
     return vote, front, back
+
+
+def seen_from(
+    points: np.ndarray, normals: np.ndarray, views: np.ndarray, steepest: float = 0.17
+) -> np.ndarray:
+    """Which `points` (n, 3) of a surface are seen from each of the directions `views` (d, 3).
+
+    Returns (d, n) bool. A point must face the view, the cosine to its outward normal (`normals`
+    (n, 3)) being above `steepest`, and nothing may lie before it.
+    """
+    points, normals = points.astype(np.float32), normals.astype(np.float32)
+    spacing = _spacing(_nearest(points, min(9, len(points)))[0])
+    images = _depth_images(points, normals, views, spacing, 0.4)
+    return np.array([seen & (normals @ view > steepest) for view, seen in images])
 
 
 def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -217,6 +247,41 @@ def _seen_from(
     toward = np.zeros_like(points)
     for view, seen in _depth_images(points, normals, views, spacing, tolerance):
         toward += seen[:, None] * view
+    return toward
+
+
+def _seen_by(
+    points: np.ndarray, normals: np.ndarray | None, sensors: np.ndarray, spacing: float
+) -> np.ndarray:
+    """Sum (n, 3) of the unit vectors to those `sensors` (s, 3) that can see each point.
+
+    Perspective depth images with cells of twice the point `spacing` at the points' middle. With
+    `normals` (n, 3), any sign, a surface is allowed to be as deep in a cell as its slant makes it.
+    A point behind all others in every image was measured all the same, so it gets a little of each
+    sensor.
+    """
+    toward = np.zeros_like(points)
+    for sensor in sensors:
+        offset = sensor - points
+        distance = np.linalg.norm(offset, axis=1)
+        offset /= distance[:, None]
+        axis = sensor / max(float(np.linalg.norm(sensor)), 1e-6)
+        helper = np.eye(3, dtype=np.float32)[int(np.abs(axis).argmin())]
+        right = np.cross(axis, helper)
+        right /= np.linalg.norm(right)
+        depth = np.maximum(offset @ axis, 1e-3)
+        cell = 2.0 * spacing / max(float(np.median(distance)), 1e-3)
+        x, y = (-(offset @ side) / depth / cell for side in (right, np.cross(axis, right)))
+        _, pixel = np.unique(np.floor(np.stack([x, y], 1)), axis=0, return_inverse=True)
+        nearest = np.full(int(pixel.max()) + 1, np.inf, dtype=np.float32)
+        np.minimum.at(nearest, pixel.ravel(), distance)
+        thickness = np.float32(2.0)
+        if normals is not None:
+            facing = np.abs(np.einsum("na,na->n", normals, offset))
+            slant = np.sqrt(np.maximum(1.0 - facing**2, 0.0)) / np.maximum(facing, 0.2)
+            thickness = 0.7 + 2.0 * slant
+        seen = distance <= nearest[pixel.ravel()] + thickness * spacing
+        toward += np.where(seen, 1.0, 0.01)[:, None] * offset
     return toward
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -15,6 +16,8 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 USUAL_SIZES = {"chair": (0.4, 1.6), "car": (2.5, 8.0), "plane": (4.0, 85.0), "table": (0.4, 4.0)}
 """Longest sides (m) that objects of a category usually have."""
+
+_FAR = 3.0  # times outside of the usual sizes from which a unit that was given is doubted
 
 OTHER_UNITS = {
     "_mm_s": ("_m_s", 1e-3),
@@ -39,6 +42,40 @@ def guess_unit(longest_side: float, category: str) -> str | None:
     low, high = USUAL_SIZES.get(category, (math.inf, -math.inf))
     fitting = [unit for unit, metres in METRES.items() if low <= longest_side * metres <= high]
     return fitting[0] if len(fitting) == 1 else None
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a scan. name: one of `METRES`, None if unknown. origin: "given", "guessed" or
+    "unknown". doubt: why it may be wrong, "" if nothing speaks against it."""
+
+    name: str | None
+    origin: str
+    doubt: str = ""
+
+
+def find_unit(given: str | None, longest_side: float, category: str) -> Unit:
+    """The unit of a scan whose object has this longest side, in that unit.
+
+    given: what the file or the user says, None if neither does. Models and toys exist, so a unit
+    that was given is kept, whatever the size.
+    """
+    usual = USUAL_SIZES.get(category)
+    if usual is None:
+        return Unit(given, "given" if given else "unknown")
+    low, high = usual
+    fitting = [name for name, metres in METRES.items() if low <= longest_side * metres <= high]
+    range_ = f"{low:g} to {high:g} m"
+    if given is None:
+        if fitting:
+            several = f"a usual {category} may be this long in {' or '.join(fitting)}"
+            return Unit(fitting[0], "guessed", several if len(fitting) > 1 else "")
+        return Unit(None, "unknown", f"in no unit is it {range_} long, as a {category} usually is")
+    size = longest_side * METRES[given]
+    if low / _FAR <= size <= high * _FAR:
+        return Unit(given, "given")
+    hint = f"; in {fitting[0]} it would be" if fitting else ""
+    return Unit(given, "given", f"{size:.3g} m is not the {range_} of a usual {category}{hint}")
 
 
 def other_names(si_name: str) -> dict[str, float]:

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from nrdf.cloud import PointCloud
-from nrdf.regions.model import Embedded, Model
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
 
 STARTS = 4
@@ -51,7 +52,7 @@ class DescriptorSearch:
             for name, region in regions.items()
         }
         every = np.concatenate(list(chosen.values()))
-        points = (reference.points[every] - on_reference.centre) / on_reference.scale
+        points = on_reference.canonical(reference.points[every])
         wanted = self._describe(on_reference, points)
         if self.energy:
             found = cKDTree(on_target.points).query(self._minimise(on_target, wanted))[1]

@@ -22,7 +22,8 @@ from nrdf.benchmark.metrics import METRICS, MISSED, chamfer_l1
 from nrdf.cloud import PointCloud
 from nrdf.errors import ConfigError, DataError, NrdfError, OutputError, unknown_name
 from nrdf.ply import write_atomically
-from nrdf.regions.model import Embedded, Model
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
 from nrdf.shapes.pool import CRASHED, each
 
@@ -132,7 +133,7 @@ def score_shape(model: Model, shape: Shape, settings: Settings) -> ShapeScore:
     cloud = cloud[rng.permutation(len(cloud))[: settings.points]]
     sampling = chamfer_l1(cloud[::2], cloud[1::2])
     embedded = model.embed(PointCloud(shape.surface_points, shape.surface_normals))
-    queries = (shape.query_points.astype(float) - embedded.centre) / embedded.scale
+    queries = embedded.canonical(shape.query_points.astype(float))
     guess = 1 / (1 + np.exp(-np.clip(logits(model, embedded, queries), -50, 50)))
     mse = float(np.mean((guess - shape.query_occupancies) ** 2))
     surface = level_set(model, embedded, settings)

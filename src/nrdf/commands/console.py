@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, JustifyMethod
@@ -100,3 +101,14 @@ def command_line() -> str:
     import shlex
 
     return shlex.join(["nrdf", *sys.argv[1:]])
+
+
+def write_report(folder: Path, report: dict[str, Any]) -> None:
+    """Write report.json, with the time and the list of all files beside it."""
+    from datetime import datetime, timezone
+
+    from nrdf.output import REPORT, write_json
+
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    date = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_json(folder / REPORT, {"date": date, **report, "files": [*files, REPORT]})

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes, Positional
 
-from nrdf.commands.console import command_line, console, show, table
+from nrdf.commands.console import command_line, console, show, table, write_report
 from nrdf.export.options import Options
 
 
@@ -32,7 +32,6 @@ def export(
         programs: Choices about what is written.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.commands.retrieve import write_report
     from nrdf.export.registry import check_formats, export_job
     from nrdf.output import output_folder
     from nrdf.process.toolpath import read_job

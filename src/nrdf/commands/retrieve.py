@@ -8,14 +8,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.console import command_line, console, provenance, show, table, versions
+from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, warn_of_doubts
+from nrdf.commands.console import (
+    command_line,
+    console,
+    provenance,
+    show,
+    table,
+    versions,
+    write_report,
+)
+from nrdf.errors import CloudError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from nrdf.cloud import PointCloud
     from nrdf.picture import Panel
-    from nrdf.regions.model import Match
+    from nrdf.regions.embedded import Embedded
+    from nrdf.regions.match import Match
 
 log = logging.getLogger(__name__)
 
@@ -28,16 +39,24 @@ def retrieve(
     out: Path,
     method: Literal["mask", "points"] = "mask",
     refine: bool = False,
+    up: str | None = None,
+    sensor: tuple[float, ...] = (),
+    unit: Unit | None = None,
+    skip: tuple[Skip, ...] = (),
+    topic: str | None = None,
     device: str = "cpu",
+    strict: bool = False,
     overwrite: bool = False,
-) -> None:
+) -> int:
     """Find the regions of a reference object on a target object.
 
-    Both are of the category that the model is for.
+    Both are of the category that the model is for. With --up the target is a scan in any pose: it
+    is cleaned and aligned first, as by `nrdf align`.
 
     Writes into the output folder: for each region a PLY of the target's own points in it, with
     confidence (0 to 1) and index (into the target) as properties; report.json; picture.png. All
-    in the target file's own coordinates and unit.
+    in the target file's own coordinates and unit. A region that the target does not have, or that
+    the scan did not see, is empty, and the report says which.
 
     Example: nrdf retrieve --model chair --reference ref.ply --region seat.ply back.ply --target
     new.ply --out result/
@@ -49,17 +68,26 @@ def retrieve(
         region: One file a region, named by it: a cloud whose points lie on the reference, a .npy of
             points (m, 3), of a mask (n,) or of indices (m,) of the reference's points; or a .npz
             of such arrays, one a region.
-        target: Cloud or mesh of the object to find them on, in the same frame; any unit.
+        target: Cloud or mesh of the object to find them on, in the same frame, or in any with --up;
+            any unit.
         out: Folder to write; made if missing.
         method: mask: each target point asks the mapped reference points nearest to it;
             points: each region point's prediction is snapped to the target (the paper's).
         refine: Move the mapped reference onto the target in a few steps first, about half a second
             more.
+        up: The target is a scan; direction in it that points up: x, y, z, -x, -y, -z, or 'x y z',
+            or auto.
+        sensor: Where the scan's sensors stood: x y z of each. The file may say so as well.
+        unit: Unit of the scan, instead of what its file says.
+        skip: Steps of cleaning the scan to leave out.
+        topic: What to read of a ROS 2 bag that has clouds under several topics.
         device: cpu, cuda, cuda:N or auto.
+        strict: End with 3 where there is any doubt about the scan's pose.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.output import output_folder
 
+    doubts: list[str] = []
     with output_folder(out, overwrite) as folder:
         clock = Clock()
         import nrdf
@@ -68,19 +96,30 @@ def retrieve(
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
-        reference_cloud, target_cloud = nrdf.read_cloud(reference), nrdf.read_cloud(target)
+        reference_cloud = nrdf.read_cloud(reference)
+        scan = None
+        if up is None:
+            if sensor or unit or skip or strict:
+                raise CloudError("--sensor, --unit, --skip and --strict are for scans: give --up")
+            target_cloud = nrdf.read_cloud(target, topic=topic)
+        else:
+            scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+            warn_of_doubts(scan, target)
+            target_cloud, doubts = scan.scan, scan.doubts
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
-        embedded = loaded.embed(target_cloud)
+        embedded = loaded.embed(target_cloud) if scan is None else scan.embed()
         matches = taught.retrieve_all(regions, embedded, method, refine)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
         panels = [
             region_panel(title, reference_cloud, reference_indices(regions, reference_cloud)),
-            region_panel(target.name, target_cloud, {n: m.indices for n, m in matches.items()}),
+            target_panel(target.name, embedded, {n: m.indices for n, m in matches.items()}),
         ]
+        if scan is not None:
+            matches = {name: scan.in_scan(match) for name, match in matches.items()}
         write_matches(folder, target_cloud, matches)
         draw_regions(panels, folder / "picture.png")
         clock.lap("write")
@@ -92,6 +131,7 @@ def retrieve(
             "reference": describe_cloud(reference, reference_cloud),
             "target": describe_cloud(target, target_cloud),
             "coordinates": "the target file's own frame and unit",
+            **({} if scan is None else {"alignment": describe_alignment(scan)}),
             "regions": describe_matches(matches, target_cloud),
             "seconds": {**clock.seconds, "of the target": embedded.seconds},
             "versions": versions(),
@@ -99,6 +139,7 @@ def retrieve(
         write_report(folder, report)
     show_matches(matches, target_cloud)
     console.print(f"{clock.total:.1f} s; results, report and picture in {out}")
+    return 3 if strict and doubts else 0
 
 
 class Clock:
@@ -135,6 +176,16 @@ def region_panel(
     return Panel(title, cloud.points, cloud.normals, dict(regions), note)
 
 
+def target_panel(title: str, embedded: Embedded, regions: Mapping[str, np.ndarray]) -> Panel:
+    """An embedded cloud in the category's frame, with regions of the whole cloud's indices."""
+    import numpy as np
+
+    from nrdf.picture import Panel
+
+    shown = {name: np.isin(embedded.working, indices) for name, indices in regions.items()}
+    return Panel(title, embedded.points, embedded.normals, shown)
+
+
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:
     return {
         "file": str(path),
@@ -153,6 +204,9 @@ def describe_matches(matches: Mapping[str, Match], target: PointCloud) -> dict[s
             "points": len(match.indices),
             "share_of_target": round(len(match.indices) / len(target), 5),
             "mean_confidence": round(match.score, 4),
+            "reason": match.presence.reason or None,
+            "confidence_of_presence": round(match.presence.confidence, 4),
+            "share_observed": round(match.presence.observed, 4),
             "centre": target.points[match.indices].mean(axis=0).tolist()
             if len(match.indices)
             else None,
@@ -161,22 +215,14 @@ def describe_matches(matches: Mapping[str, Match], target: PointCloud) -> dict[s
     }
 
 
-def write_report(folder: Path, report: dict[str, Any]) -> None:
-    """Write report.json, with the time and the list of all files beside it."""
-    from datetime import datetime, timezone
-
-    from nrdf.output import REPORT, write_json
-
-    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
-    date = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    write_json(folder / REPORT, {"date": date, **report, "files": [*files, REPORT]})
-
-
 def show_matches(matches: Mapping[str, Match], target: PointCloud) -> None:
     shown = table("", "region", "points", "of the target", "mean confidence")
     for name, match in matches.items():
         share = len(match.indices) / len(target)
         shown.add_row(name, f"{len(match.indices)}", f"{share:.1%}", f"{match.score:.2f}")
-        if not len(match.indices):
+        if match.presence.reason:
+            sure = match.presence.confidence
+            log.warning("region '%s': %s (confidence %.2f)", name, match.presence.reason, sure)
+        elif not len(match.indices):
             log.warning("region '%s' was found nowhere on the target", name)
     show(shown)

@@ -14,6 +14,7 @@ from nrdf.commands.console import (
     show,
     table,
     versions,
+    write_report,
 )
 
 if TYPE_CHECKING:
@@ -87,7 +88,6 @@ def overlap(indices: np.ndarray, truth: np.ndarray) -> float:
 def _run(folder: Path, model: str, device: str) -> list[Found]:
     import nrdf
     from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-    from nrdf.commands.retrieve import write_report
     from nrdf.export.registry import export_job
     from nrdf.picture import draw_regions
     from nrdf.process.job_folder import job_of, panel_of, write_transfer

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
+from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
+
+if TYPE_CHECKING:
+    from nrdf.scans.target import AlignedScan
 
 
 def transfer(
@@ -15,7 +20,11 @@ def transfer(
     target: Path,
     out: Path,
     model: str | None = None,
-    unit: Literal["m", "cm", "mm", "in"] | None = None,
+    unit: Unit | None = None,
+    up: str | None = None,
+    sensor: tuple[float, ...] = (),
+    skip: tuple[Skip, ...] = (),
+    topic: str | None = None,
     min_confidence: float | None = None,
     min_coverage: float | None = None,
     max_line_spacing_mm: float | None = None,
@@ -37,11 +46,16 @@ def transfer(
 
     Args:
         knowledge: Knowledge file, as `nrdf knowledge new` begins it.
-        target: Cloud or mesh of the new object: +X forward, +Y up.
+        target: Cloud or mesh of the new object: +X forward, +Y up, or in any pose with --up.
         out: Folder to write; made if missing.
         model: Zoo name, weight file or run; the category's model in the zoo unless given.
         unit: Of the target's file, where it does not say: m, cm, mm or in.
-        min_confidence: Regions found with less mean confidence are taken to be absent (0.3).
+        up: The target is a scan, to be cleaned and aligned first, as by `nrdf align`; direction in
+            it that points up: x, y, z, -x, -y, -z, or 'x y z', or auto.
+        sensor: Where the scan's sensors stood: x y z of each. The file may say so as well.
+        skip: Steps of cleaning the scan to leave out.
+        topic: What to read of a ROS 2 bag that has clouds under several topics.
+        min_confidence: Regions found with less mean confidence are taken to be absent (0.2).
         min_coverage: Limit on the share of each region that its tool reaches, 0 to 1.
         max_line_spacing_mm: Limit on the distance between neighbouring lines.
         max_surface_distance_mm: Limit on the waypoints' distance from the surface.
@@ -53,7 +67,7 @@ def transfer(
     """
     import math
 
-    from nrdf.errors import LimitError
+    from nrdf.errors import CloudError, LimitError
     from nrdf.output import output_folder
     from nrdf.process.limits import Limits
 
@@ -65,6 +79,8 @@ def transfer(
         max_cycle_time_s=max_cycle_time_s,
         require_all=require_all,
     )
+    if up is None and (sensor or skip):
+        raise CloudError("--sensor and --skip are for scans: give --up")
     with output_folder(out, overwrite) as folder:
         import nrdf
         from nrdf.process.job_folder import write_transfer
@@ -73,18 +89,30 @@ def transfer(
 
         lesson = read_lesson(knowledge)
         category = lesson.knowledge.category
-        cloud = nrdf.read_cloud(target)
-        known = known_unit(cloud, unit, category, str(target), "--unit")
         loaded = nrdf.load_model(model or category, device)
+        scan = None
+        if up is None:
+            cloud = nrdf.read_cloud(target, topic=topic)
+            known = known_unit(cloud, unit, category, str(target), "--unit")
+        else:
+            with errors.status("alignment"):
+                scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+            known = _scan_unit(scan, target)
         with errors.status("reference"):
             teacher = Teacher(lesson, loaded)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
-            transferred = teacher.transfer(cloud, known, least)
+            if scan is None:
+                transferred = teacher.transfer(cloud, known, least)
+            else:
+                transferred = teacher.transfer(scan.embed_in_metres(known), None, least)
+                warnings = (*scan.doubts, *transferred.warnings)
+                transferred = replace(transferred, warnings=warnings)
         origin = {
             "command": command_line(),
             "knowledge": str(knowledge),
             "target": str(target),
+            **({} if scan is None else {"alignment": describe_alignment(scan)}),
             "model": provenance(loaded.metadata),
             "versions": versions(),
         }
@@ -111,6 +139,23 @@ def show_transfer(report: dict[str, Any]) -> None:
     show(shown)
     for warning in report["warnings"]:
         errors.print(warning, style="yellow")
+
+
+def _scan_unit(scan: AlignedScan, target: Path) -> str:
+    """The scan's unit. Raises ProcessError unless it is given or only one is plausible."""
+    from nrdf.errors import ProcessError
+    from nrdf.units import METRES
+
+    unit = scan.unit
+    if unit.name is None or (unit.origin == "guessed" and unit.doubt):
+        why = f" ({unit.doubt})" if unit.doubt else ""
+        raise ProcessError(
+            f"{target} does not say its unit{why}: give --unit ({', '.join(METRES)})"
+        )
+    if unit.origin == "guessed":
+        said = f"{target} does not say its unit; taken to be {unit.name}, from the object's size"
+        errors.print(said, style="yellow")
+    return unit.name
 
 
 def _summary(report: dict[str, Any]) -> str:

@@ -19,7 +19,8 @@ from nrdf.process.frames import surface_frames, travel_of
 from nrdf.process.surface import Surface, unit
 from nrdf.process.taught import TaughtLine, feet_under
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
-from nrdf.regions.model import Embedded, Taught
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.model import Taught
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
@@ -114,7 +115,9 @@ class Correspondence:
         """
         embedded, whole = self.embedded, self.reference.taught.reference
         mapped = self.reference.taught.map_places(points, normals, embedded)
-        asked = oriented_features((points - whole.centre) / whole.scale, normals, NORMAL_WEIGHT)
+        asked = oriented_features(
+            whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
+        )
         distance, near = self.reference.tree.query(asked, _BLENDED)
         weight = 1.0 / (distance + _BLEND) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
@@ -125,9 +128,11 @@ class Correspondence:
         offset = arrived - start
         sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
         length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        spacing = self.target.spacing / embedded.scale
+        spacing = self.target.spacing / embedded.pose.scale
         kept = start + sideways * np.minimum(1.0, _KEPT * spacing / np.maximum(length, 1e-12))
-        found, found_normals = self.target.project(embedded.original(kept), outward)
+        found, found_normals = self.target.project(
+            embedded.original(kept), embedded.original_normals(outward)
+        )
         exists = np.linalg.norm(offset, axis=1) <= FARTHEST + spacing
         exists &= length[:, 0] <= BEYOND + spacing
         return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
@@ -145,7 +150,8 @@ class Correspondence:
         spread = here.T @ here
         size = float(np.trace(spread))
         if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
-            return unit(np.asarray(direction, float))
+            canonical = taught.reference.canonical_normals(np.asarray(direction, float))
+            return unit(self.embedded.original_normals(canonical))
         turn, _ = Rotation.align_vectors(there, here)
         similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
         ridge = 0.05 * size / 3.0 * np.eye(3)
@@ -191,7 +197,7 @@ class Correspondence:
 
 def surface_of(embedded: Embedded) -> Surface:
     """The surface of a cloud in metres, of the points that the field works on."""
-    return Surface(embedded.original(embedded.points), embedded.normals)
+    return Surface(embedded.original(embedded.points), embedded.original_normals(embedded.normals))
 
 
 def _frames(

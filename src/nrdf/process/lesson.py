@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nrdf.cloud import PointCloud, check_cloud, read_cloud
+from nrdf.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.errors import CloudError, NrdfError, ProcessError
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import listed, read_knowledge
@@ -112,11 +112,6 @@ def known_unit(cloud: PointCloud, unit: str | None, category: str, what: str, op
         odd = f"{metres:.4g} m long{_usual(category)}"
         log.warning("%s is %s: is its unit, %s, right?", what, odd, known)
     return known
-
-
-def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
-    """The cloud, whose coordinates are in `unit`, in metres."""
-    return replace(cloud, points=cloud.points * METRES[unit], unit="m")
 
 
 def checksum(path: Path) -> str:

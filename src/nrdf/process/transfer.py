@@ -16,18 +16,20 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nrdf.cloud import PointCloud
+from nrdf.cloud import PointCloud, in_metres
 from nrdf.errors import ModelError, ProcessError
 from nrdf.output import output_folder
 from nrdf.process.carry import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Line, Process, Transfer
-from nrdf.process.lesson import Lesson, in_metres, known_unit, overlaps
+from nrdf.process.lesson import Lesson, known_unit, overlaps
 from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught import TaughtLine, taught_lines
 from nrdf.process.toolpath import Segment, ToolPath
-from nrdf.regions.model import Embedded, Match, Model
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.match import Match
+from nrdf.regions.model import Model
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
@@ -108,21 +110,24 @@ class Teacher:
 
     def transfer(
         self,
-        target: PointCloud,
+        target: PointCloud | Embedded,
         unit: str | None = None,
         min_confidence: float = MIN_CONFIDENCE,
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
-        unit: of the target, where its file did not say. A region that is found nowhere, or with
+        target: in the category's orientation, or embedded in any pose, in metres. unit: of the
+        target, where its file did not say. A region that is found nowhere, or with
         less mean confidence than `min_confidence`, is skipped; a process that does not fit its
         region there is left out with the reason. Raises CloudError for a target that cannot be
         used, ProcessError for one whose unit nothing tells.
         """
-        category = self.lesson.knowledge.category
-        target = in_metres(target, known_unit(target, unit, category, "the target", "unit"))
         start = time.perf_counter()
-        embedded = self.model.embed(target)
+        if isinstance(target, Embedded):
+            embedded = target
+        else:
+            known = known_unit(target, unit, self.lesson.knowledge.category, "the target", "unit")
+            embedded = self.model.embed(in_metres(target, known))
         matches = self.taught.retrieve_all(self.lesson.regions, embedded)
         found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
         seconds = {"regions": time.perf_counter() - start}
@@ -228,7 +233,8 @@ def with_normals(embedded: Embedded) -> PointCloud:
     """The whole cloud with the normals that the field works with."""
     if embedded.cloud.normals is not None:
         return embedded.cloud
-    return replace(embedded.cloud, normals=embedded.normals[embedded.nearest_working])
+    normals = embedded.original_normals(embedded.normals)
+    return replace(embedded.cloud, normals=normals[embedded.nearest_working])
 
 
 def working(embedded: Embedded, indices: np.ndarray) -> np.ndarray:
@@ -239,6 +245,8 @@ def working(embedded: Embedded, indices: np.ndarray) -> np.ndarray:
 
 
 def _missing(match: Match, min_confidence: float) -> str:
+    if match.presence.reason:
+        return f"{match.presence.reason} (confidence {match.presence.confidence:.2f})"
     if not len(match.indices):
         return "found nowhere on the target"
     if match.score < min_confidence:

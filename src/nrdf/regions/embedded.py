@@ -11,6 +11,8 @@ from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
 from nrdf.geometry import thin
+from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.similarity import Similarity
 
 
 @dataclass(frozen=True)
@@ -18,22 +20,33 @@ class Embedded:
     """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
 
     cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
-    canonical. centre (3,), scale: canonical = (original - centre) / scale. z: (1, d_z).
-    seconds: time of each phase.
+    canonical. pose: from canonical coordinates to the cloud's. z: (1, d_z). seconds: time of each
+    phase.
     """
 
     cloud: PointCloud
     working: np.ndarray
     points: np.ndarray
     normals: np.ndarray
-    centre: np.ndarray
-    scale: float
+    pose: Similarity
     z: torch.Tensor
     seconds: dict[str, float] = field(default_factory=dict)
 
     def original(self, points_canonical: np.ndarray) -> np.ndarray:
         """Canonical points (m, 3) in the cloud's own frame and unit."""
-        return np.asarray(points_canonical, np.float64) * self.scale + self.centre
+        return self.pose.to_scan(np.asarray(points_canonical, np.float64))
+
+    def canonical(self, points: np.ndarray) -> np.ndarray:
+        """Points (m, 3) of the cloud's own frame and unit in canonical coordinates."""
+        return self.pose.to_canonical(points)
+
+    def original_normals(self, normals_canonical: np.ndarray) -> np.ndarray:
+        """Canonical directions (m, 3) in the cloud's own frame."""
+        return normals_canonical @ self.pose.rotation.T
+
+    def canonical_normals(self, normals: np.ndarray) -> np.ndarray:
+        """Directions (m, 3) of the cloud's own frame in the canonical one."""
+        return normals @ self.pose.rotation
 
     def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Selected working points as indices of the whole cloud, and which working point each
@@ -52,8 +65,17 @@ class Embedded:
         """The position in `working` of the point nearest to each point of the cloud."""
         if self.is_whole:
             return self.working
-        points = (self.cloud.points - self.centre) / self.scale
-        return cKDTree(self.points).query(points)[1]
+        return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
+
+    def distance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Distance (m,) of canonical points and normals (m, 3) from the working points, in position
+        and weighted normal."""
+        features = oriented_features(points, normals, NORMAL_WEIGHT)
+        return self._oriented_tree.query(features)[0]
+
+    @cached_property
+    def _oriented_tree(self) -> cKDTree:
+        return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))
 
     @cached_property
     def tree(self) -> cKDTree:

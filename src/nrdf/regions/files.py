@@ -11,7 +11,7 @@ import numpy as np
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
 from nrdf.picture import region_colours
-from nrdf.regions.model import Match
+from nrdf.regions.match import Match
 from nrdf.regions.region import REGION_NAME
 from nrdf.units import METRES
 

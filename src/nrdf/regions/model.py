@@ -6,10 +6,9 @@ A `Model` embeds clouds; a `Taught` is one reference with its descriptors, and r
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -20,61 +19,18 @@ from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
 from nrdf.regions.embedded import Embedded, encoder_subset
+from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
+from nrdf.regions.presence import find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
+from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
 
 METHODS = ("mask", "points")
 WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
 _CHUNK = 8192  # points described or inverted at a time
-# Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
-# and of the error that the field expects of itself.
-_TRUST_SCALE = 0.2
-
-
-@dataclass(frozen=True)
-class Match:
-    """A region found on a target.
-
-    indices: (k,) the target's own points in the region, ascending.
-    points: (m, 3) where C puts each point of the reference's region, in its order, in the
-        target's frame and unit (raw prediction, off the surface by the field's error).
-    confidence: (k,) in [0, 1], for each of `indices`.
-    method: "mask" or "points".
-    """
-
-    indices: np.ndarray
-    points: np.ndarray
-    confidence: np.ndarray
-    method: str
-
-    @property
-    def score(self) -> float:
-        """Mean confidence of the region's points; 0 for an empty region."""
-        return float(self.confidence.mean()) if len(self.confidence) else 0.0
-
-
-class Mapped(NamedTuple):
-    """Reference points on a target, canonical: points (m, 3), normals (m, 3), existence (m,) in
-    [0, 1] (does the target have such a place?), error (m,) that the field expects; 1 and 0 for a
-    field that says nothing of the kind. moved: (m, 3), how far refinement has moved the points."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    existence: np.ndarray
-    error: np.ndarray
-    moved: np.ndarray
-
-    def shifted(self, moved: np.ndarray) -> Mapped:
-        """The same, moved by (m, 3)."""
-        return self._replace(points=self.points + moved, moved=self.moved + moved)
-
-    @property
-    def trust(self) -> np.ndarray:
-        """(m,) in [0, 1]: that the place exists, and how small an error is expected."""
-        return self.existence * np.exp(-self.error / _TRUST_SCALE)
 
 
 class Model:
@@ -103,28 +59,43 @@ class Model:
     def __repr__(self) -> str:
         return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"
 
-    def embed(self, cloud: PointCloud) -> Embedded:
+    def embed(
+        self, cloud: PointCloud, pose: Similarity | None = None, mirrored: bool = False
+    ) -> Embedded:
         """Thin, orient, normalise and embed a cloud in the category's canonical frame.
 
         Any unit, centre and scale will do. Normals are used as they are, or estimated where there
-        are none. Raises CloudError for a cloud that is empty, flat, or has too few points.
+        are none. Without `pose` (from canonical coordinates to the cloud's) the cloud is in the
+        canonical orientation and its bounding box gives the rest. With `mirrored` the field sees
+        the cloud's mirror image beside it, left for right: an object that was seen in part from one
+        side is embedded more like a whole one. Raises CloudError for a cloud that is empty, flat,
+        or has too few points.
         """
         check_cloud(cloud, MINIMUM_POINTS)
         seconds: dict[str, float] = {}
         start = time.perf_counter()
-        centre, scale = canonical_transform(cloud.points)
+        if pose is None:
+            pose = Similarity(np.eye(3), *canonical_transform(cloud.points))
         working = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
-        points = (cloud.points[working] - centre) / scale
+        points = pose.to_canonical(cloud.points[working])
         seconds["normalise"] = time.perf_counter() - start
         start = time.perf_counter()
-        normals = estimate_normals(points) if cloud.normals is None else cloud.normals[working]
+        if cloud.normals is None:
+            sensors = None if cloud.sensors is None else pose.to_canonical(cloud.sensors)
+            normals = estimate_normals(points, sensors=sensors)
+        else:
+            normals = cloud.normals[working] @ pose.rotation
         seconds["normals"] = time.perf_counter() - start
         start = time.perf_counter()
-        chosen = encoder_subset(points, self.field.config.encoder_points)
+        seen, lines = points, normals
+        if mirrored:
+            seen = np.concatenate([points, points * LEFT_FOR_RIGHT])
+            lines = np.concatenate([normals, normals * LEFT_FOR_RIGHT])
+        chosen = encoder_subset(seen, self.field.config.encoder_points)
         with torch.inference_mode():
-            z = self.field.embed(self._tensor(points[chosen]), self._tensor(normals[chosen]))
+            z = self.field.embed(self.tensor(seen[chosen])[None], self.tensor(lines[chosen])[None])
         seconds["embed"] = time.perf_counter() - start
-        return Embedded(cloud, working, points, normals, centre, scale, z, seconds)
+        return Embedded(cloud, working, points, normals, pose, z, seconds)
 
     def set_reference(self, reference: PointCloud) -> Taught:
         """Embed a reference and describe its surface once, for any number of targets.
@@ -133,8 +104,9 @@ class Model:
         """
         return Taught(self, self.embed(reference))
 
-    def _tensor(self, values: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(values, dtype=torch.float32, device=self.device)[None]
+    def tensor(self, values: np.ndarray) -> torch.Tensor:
+        """Values of any shape on the model's device, in single precision."""
+        return torch.as_tensor(values, dtype=torch.float32, device=self.device)
 
 
 class Taught:
@@ -191,12 +163,17 @@ class Taught:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self.model.embed(target)
         surface = self.map_surface(embedded, refine)
+        start = time.perf_counter()
         if method == "mask":
-            return self._by_mask(chosen, embedded, surface)
-        return {
-            name: self._by_points(self.map_points(indices, embedded, surface), embedded)
-            for name, indices in chosen.items()
-        }
+            matches = self._by_mask(chosen, embedded, surface)
+        else:
+            matches = {
+                name: self._by_points(self.map_points(indices, embedded, surface), embedded)
+                for name, indices in chosen.items()
+            }
+        matches = {n: self._judged(m, chosen[n], embedded, surface) for n, m in matches.items()}
+        embedded.seconds["associate"] = time.perf_counter() - start
+        return matches
 
     def map_surface(self, target: Embedded, refine: bool = False) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
@@ -222,12 +199,14 @@ class Taught:
         reference = self.reference
         if reference.is_whole:
             if surface is not None:
-                return Mapped(*(values[indices] for values in surface))
+                return surface.select(indices)
             return self._invert(target, self._k[:, indices], reference.normals[indices])
         nearest = reference.nearest_working[indices]
-        given = reference.cloud.normals
-        normals = reference.normals[nearest] if given is None else given[indices]
-        mapped = self.map_places(reference.cloud.points[indices], normals, target)
+        points = reference.canonical(reference.cloud.points[indices])
+        normals = reference.normals[nearest]
+        if reference.cloud.normals is not None:
+            normals = reference.canonical_normals(reference.cloud.normals[indices])
+        mapped = self._invert(target, self._describe(points, normals), normals)
         return mapped if surface is None else mapped.shifted(surface.moved[nearest])
 
     def map_places(self, points: np.ndarray, normals: np.ndarray, target: Embedded) -> Mapped:
@@ -235,17 +214,27 @@ class Taught:
 
         points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
         """
-        canonical = (points - self.reference.centre) / self.reference.scale
-        return self._invert(target, self._describe(canonical, normals), normals)
+        points = self.reference.canonical(points)
+        normals = self.reference.canonical_normals(normals)
+        return self._invert(target, self._describe(points, normals), normals)
+
+    def _judged(
+        self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
+    ) -> Match:
+        """The match, without its points where the target lacks the region or shows it not."""
+        region = surface.select(self._working_mask(indices))
+        # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
+        off = target.distance(region.points - region.moved, region.normals)
+        usual = float(np.median(surface.error))
+        return match.with_presence(find_presence(region.existence, region.error, usual, off))
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped
     ) -> dict[str, Match]:
-        start = time.perf_counter()
         asked, distance = voters(
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
-        trust = mapped.trust[asked] * np.exp(-distance / _TRUST_SCALE)
+        trust = mapped.trust[asked] * np.exp(-distance / TRUST_SCALE)
         patches = find_patches(target.points, explained_by(distance, mapped.error[asked]))
         matches = {}
         for name, indices in chosen.items():
@@ -264,15 +253,12 @@ class Taught:
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
-        target.seconds["associate"] = time.perf_counter() - start
         return matches
 
     def _by_points(self, mapped: Mapped, target: Embedded) -> Match:
-        start = time.perf_counter()
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(nearest, return_index=True)
-        trust = mapped.trust * np.exp(-distance / _TRUST_SCALE)
-        target.seconds["associate"] = time.perf_counter() - start
+        trust = mapped.trust * np.exp(-distance / TRUST_SCALE)
         return Match(
             indices=target.working[found],
             points=target.original(mapped.points),
@@ -300,7 +286,9 @@ class Taught:
                 part = slice(start, start + _CHUNK)
                 parts.append(
                     model.field.describe(
-                        self.reference.z, model._tensor(points[part]), model._tensor(normals[part])
+                        self.reference.z,
+                        model.tensor(points[part])[None],
+                        model.tensor(normals[part])[None],
                     )
                 )
         return torch.cat(parts, dim=1)
@@ -310,26 +298,5 @@ class Taught:
         with torch.inference_mode():
             for start in range(0, k.shape[1], _CHUNK):
                 inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
-                own = normals[start : start + _CHUNK]
-                parts.append(
-                    Mapped(
-                        inverse.points[0].cpu().numpy(),
-                        own if inverse.normals is None else inverse.normals[0].cpu().numpy(),
-                        _or_constant(inverse.existence, torch.sigmoid, 1.0, len(own)),
-                        _or_constant(inverse.log_error, torch.exp, 0.0, len(own)),
-                        np.zeros((len(own), 3), np.float32),
-                    )
-                )
+                parts.append(mapped_points(inverse, normals[start : start + _CHUNK]))
         return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _or_constant(
-    values: torch.Tensor | None,
-    function: Callable[[torch.Tensor], torch.Tensor],
-    constant: float,
-    count: int,
-) -> np.ndarray:
-    """A function of what a field says (1, count), or a constant where it says nothing: (count,)."""
-    if values is None:
-        return np.full(count, constant, np.float32)
-    return function(values[0]).cpu().numpy()

@@ -74,6 +74,17 @@ class Deformation:
         low, high = moved.min(dim=1).values, moved.max(dim=1).values
         return replace(self, centre=(low + high) / 2, size=(high - low).max(dim=1).values)
 
+    def misframed(self, error: float, which: Tensor, generator: torch.Generator) -> Deformation:
+        """The same maps with errors of standard deviation `error` in centre and log size, where
+        `which` (b,) is set: points, queries and correspondences stay true to each other."""
+        b, device = self.centre.shape[0], self.centre.device
+        wrong = error * torch.randn(b, 4, generator=generator, device=device) * which[:, None]
+        return replace(
+            self,
+            centre=self.centre + self.size[:, None] * wrong[:, :3],
+            size=self.size * wrong[:, 3].exp(),
+        )
+
 
 def draw_deformation(
     config: AugmentConfig, surface: Tensor, mirror: Tensor, generator: torch.Generator
@@ -102,13 +113,18 @@ def draw_deformation(
 
 
 def draw_sample(
-    config: AugmentConfig, surface: Tensor, count: int, generator: torch.Generator
+    config: AugmentConfig,
+    surface: Tensor,
+    count: int,
+    generator: torch.Generator,
+    visible: Tensor | None = None,
 ) -> Tensor:
     """Indices (b, count) of a random subset of each surface (b, n, 3), as a sensor might leave it.
 
     Density varies smoothly over the object (`density`, standard deviation of its logarithm at the
     most), and up to `holes` balls of at most `hole_radius` are left out. `count` of n are always
-    found: holes give way when the rest is too few.
+    found: holes give way when the rest is too few, and points are repeated where fewer than
+    `count` of a shape are `visible` (b, n).
     """
     b, n, _ = surface.shape
     device = surface.device
@@ -126,7 +142,11 @@ def draw_sample(
         radius = config.hole_radius * torch.rand(b, 1, generator=generator, device=device)
         inside = (surface - centre[:, None]).square().sum(-1) < radius.square()
         key = key - 100.0 * inside
-    return key.topk(count, dim=1).indices
+    if visible is None:
+        return key.topk(count, dim=1).indices
+    best = key.masked_fill(~visible, -torch.inf).topk(count, dim=1).indices
+    seen = visible.sum(1, keepdim=True).clamp(1, count)
+    return best.gather(1, torch.arange(count, device=device) % seen)
 
 
 def sensor_noise(

@@ -30,6 +30,11 @@ class AugmentConfig(Strict):
     """Largest standard deviation added to each coordinate of the encoder's normals."""
     holes: int = Field(default=0, ge=0)
     hole_radius: float = Field(default=0.1, ge=0)
+    views: float = Field(default=0.0, ge=0, le=1)
+    """Probability that the encoder sees only what 1 to 4 depth cameras see of a shape."""
+    view_frame: float = Field(default=0.0, ge=0)
+    """Standard deviation of the frame's error (centre in canonical lengths, logarithm of the scale)
+    of shapes that are seen in part: their frame comes from an alignment, not from their box."""
 
 
 class DataConfig(Strict):

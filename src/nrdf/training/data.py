@@ -21,7 +21,9 @@ from nrdf.errors import ConfigError, DataError
 from nrdf.shapes.dataset import Shape, read_shape
 from nrdf.training.augment import draw_deformation, draw_sample, sensor_noise
 from nrdf.training.config import AugmentConfig, DataConfig
+from nrdf.training.pools import find_pools, pairs
 from nrdf.training.provenance import Entry
+from nrdf.training.views import draw_views, view_bits, visible_extremes
 
 log = logging.getLogger(__name__)
 
@@ -103,10 +105,13 @@ class Bank:
         self.surface = torch.stack(surface).to(self.device)
         self.surface_normals = torch.stack(normals).to(self.device)
         self.extremes = torch.cat([self.surface.argmin(1), self.surface.argmax(1)], dim=1)
+        self.view_bits: Tensor | None = None
+        if config.augment.views > 0:
+            self.view_bits = view_bits(self.surface, self.surface_normals)
         self.queries = torch.stack(queries).to(self.device)
         self.occupancies = torch.stack(occupancies).to(self.device)
         self._stack_groups(groups)
-        self.pools = _pools(self.sources, config.pools)
+        self.pools = find_pools(self.sources, config.pools)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -149,7 +154,7 @@ class Bank:
         if shares is None:
             return self
         other = copy(self)
-        other.pools = _pools(self.sources, shares)
+        other.pools = find_pools(self.sources, shares)
         return other
 
     def plain(self) -> dict[str, Bank]:
@@ -162,6 +167,7 @@ class Bank:
             if len(members) > 1:
                 found[pattern] = copy(self)
                 found[pattern].config = config
+                found[pattern].view_bits = None
                 found[pattern].pools = [(pattern, 1.0, members)]
         return found
 
@@ -217,7 +223,7 @@ class Bank:
         config = self.config
         generator = seeded(self.device, seed, step, rank)
         chosen, pool_of = self.draw_shapes(batch_size, seed, step, rank, world)
-        reference, partner = _pairs(self.pool_sizes(batch_size), config.rolls, self.device)
+        reference, partner = pairs(self.pool_sizes(batch_size), config.rolls, self.device)
         surface = self.surface[chosen]
         mirror = torch.ones(len(self.pools), device=self.device)
         if config.augment.mirror:
@@ -225,10 +231,15 @@ class Bank:
             mirror = torch.where(coin < 0.5, -mirror, mirror)
         deform = draw_deformation(config.augment, surface, mirror[pool_of], generator)
 
+        visible, extremes = None, self.extremes[chosen]
+        if self.view_bits is not None:
+            visible = draw_views(self.view_bits[chosen], config.augment.views, generator)
+            extremes = visible_extremes(surface, visible)
+            deform = deform.misframed(config.augment.view_frame, ~visible.all(1), generator)
         count = min(config.encoder_points, surface.shape[1])
-        sample = draw_sample(config.augment, surface, count, generator)
+        sample = draw_sample(config.augment, surface, count, generator, visible)
         if count > 6:  # as at inference: the embedding must know the bounding box exactly
-            sample = torch.cat([self.extremes[chosen], sample[:, 6:]], dim=1)
+            sample = torch.cat([extremes, sample[:, 6:]], dim=1)
         rows = torch.arange(len(chosen), device=self.device)[:, None]
         points, normals = surface[rows, sample], self.surface_normals[chosen[:, None], sample]
         clean_points, clean_normals = deform.points(points), deform.normals(points, normals)
@@ -300,18 +311,6 @@ class Bank:
         return offset_a + index, offset_b + index, weight, exact
 
 
-def _pairs(sizes: Sequence[int], rolls: int, device: torch.device) -> tuple[Tensor, Tensor]:
-    """Reference and partner (p,) of every pair: within each pool, the next, the one after, ..."""
-    partners = []
-    for roll in range(rolls):
-        start = 0
-        for size in sizes:
-            partners.append(start + (torch.arange(size) + 1 + roll % (size - 1)) % size)
-            start += size
-    reference = torch.arange(sum(sizes)).repeat(rolls)
-    return reference.to(device), torch.cat(partners).to(device)
-
-
 def _draw(rng: np.random.Generator, available: int, wanted: int, name: str) -> np.ndarray:
     """Indices (wanted,), in random order, repeated only when there are too few."""
     if available == 0:
@@ -323,24 +322,6 @@ def _draw(rng: np.random.Generator, available: int, wanted: int, name: str) -> n
 def _tensor(values: np.ndarray, pick: np.ndarray | None = None) -> Tensor:
     chosen = values if pick is None else values[pick]
     return torch.from_numpy(np.array(chosen, dtype=np.float32))
-
-
-def _pools(sources: list[str], shares: dict[str, float]) -> list[tuple[str, float, list[int]]]:
-    """Pattern, share and members of each pool that has members."""
-    patterns = shares or {"*": 1.0}
-    members: dict[str, list[int]] = {pattern: [] for pattern in patterns}
-    for index, source in enumerate(sources):
-        fitting = next((p for p in patterns if fnmatch(source, p)), None)
-        if fitting is None:
-            raise ConfigError(
-                f"shapes of source '{source}' belong to no pool ({', '.join(patterns)}); "
-                "add a pool '*' for the rest"
-            )
-        members[fitting].append(index)
-    for pattern in patterns:
-        if not members[pattern]:
-            log.warning("pool '%s' has no shapes and is left out", pattern)
-    return [(p, share, members[p]) for p, share in patterns.items() if members[p] and share > 0]
 
 
 def load_bank(

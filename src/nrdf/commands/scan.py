@@ -1,0 +1,104 @@
+"""`nrdf scan`: depth cameras simulated around a mesh, with the truth beside what they saw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+from nrdf.commands.console import command_line, console
+
+
+def scan(
+    mesh: Positional[Path],
+    out: Path,
+    views: int = 3,
+    noise: float = 0.0,
+    quantisation: float = 0.0,
+    grazing: float = 15.0,
+    distance: float = 2.0,
+    pixels: int = 240,
+    floor: bool = False,
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z",
+    yaw: float | None = None,
+    scale: float = 1.0,
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    unit: Literal["m", "cm", "mm", "in"] | None = None,
+    normals: bool = False,
+    seed: int = 0,
+) -> None:
+    """Simulate depth cameras around a mesh.
+
+    Writes the points as PLY, with the cameras' places as comments, and what is true of them (pose,
+    scale, cameras) as JSON beside it, under the same name.
+
+    Example: nrdf scan chair.ply --views 3 --noise 0.001 --floor --out scan.ply
+
+    Args:
+        mesh: Mesh of the object: +X forward, +Y up.
+        out: PLY file to write.
+        views: Cameras, spread around the object.
+        noise: Standard deviation of depth at the object's middle, in the mesh's unit; it grows with
+            depth squared.
+        quantisation: Step of depth there, in the mesh's unit; it grows likewise.
+        grazing: Angle in degrees between ray and surface below which points drop out.
+        distance: From the cameras to the object's middle, in its longest sides.
+        pixels: Rows and columns of each image, which the object fills.
+        floor: Put a floor under the object.
+        up: Axis of the scan that points up.
+        yaw: Turn of the object about its up axis, in degrees; random unless given.
+        scale: Length of the scan for a length 1 of the mesh.
+        offset: Where the mesh's origin lies in the scan.
+        unit: Unit of the scan's coordinates, to be noted in the file.
+        normals: Write the true normals too.
+        seed: Of everything that is random.
+    """
+    from dataclasses import replace
+
+    import numpy as np
+
+    from nrdf.cloud import write_cloud
+    from nrdf.errors import DataError
+    from nrdf.mesh import load_mesh
+    from nrdf.output import write_json
+    from nrdf.scans.simulate import ScanSettings, simulate_scan
+    from nrdf.similarity import Similarity, about_up, up_axis, upright
+
+    if not scale > 0:
+        raise DataError(f"--scale {scale:g} must be above 0")
+    if out.suffix.lower() != ".ply":
+        raise DataError(f"--out {out} must end in .ply")
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(0, 2 * np.pi) if yaw is None else np.radians(yaw)
+    pose = Similarity(upright(up_axis(up)) @ about_up(turn), np.array(offset), scale)
+    settings = ScanSettings(
+        views=views,
+        noise=noise,
+        quantisation=quantisation,
+        grazing=float(np.radians(grazing)),
+        distance=distance,
+        pixels=pixels,
+        floor=floor,
+    )
+    seen = simulate_scan(*load_mesh(mesh), settings, rng, pose, unit)
+    cloud = replace(seen.cloud, normals=seen.normals) if normals else seen.cloud
+    write_cloud(out, cloud, scalars={"view": seen.view, "face": seen.face})
+    truth = {
+        "command": command_line(),
+        "mesh": str(mesh),
+        "up": up,
+        "yaw_degrees": float(np.degrees(turn)),
+        "scale": scale,
+        "T_scan_mesh": pose.T_scan_canonical,
+        "sensors": seen.cloud.sensors,
+        "points": len(cloud),
+        "points_of_floor": int((seen.face < 0).sum()),
+        "unit": unit,
+    }
+    beside = out.with_suffix(".json")
+    write_json(beside, truth)
+    of_floor = f", {truth['points_of_floor']} of them of the floor" if floor else ""
+    console.print(
+        f"{len(cloud)} points{of_floor} in {out}; the truth in {out.with_suffix('.json')}"
+    )

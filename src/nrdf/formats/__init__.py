@@ -1,0 +1,90 @@
+"""The file formats that point clouds come in, each read by a function of its own.
+
+Every reader takes the path and the number of points to sample if the file holds a mesh, and raises
+CloudError if the file is truncated, damaged or not what it says it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from nrdf import ply
+from nrdf.errors import CloudError
+from nrdf.formats import meshes, pcd, tables
+from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
+from nrdf.units import METRES
+
+KNOWN_FORMATS = "PLY, PCD, XYZ/TXT/CSV/ASC/PTS, NPY, NPZ, OFF, OBJ, STL, GLB, ROS 2 bags"
+Reader = Callable[[Path, int], RawCloud]
+
+
+def reader_of(path: Path, start: bytes, topic: str | None = None) -> Reader:
+    """Reader for the file `path` that begins with the bytes `start`, or for a bag's folder.
+
+    `topic` names what is read of a bag. Raises CloudError, listing the known formats, if there is
+    no reader.
+    """
+    ending = path.suffix.lower()
+    if path.is_dir() or start.startswith((b"\x89MCAP0", b"SQLite format 3\0")):
+        from nrdf.formats.bag import read_bag
+
+        return partial(read_bag, topic=topic)
+    if start.startswith((b"ply\n", b"ply\r")):
+        return _read_ply
+    if start.startswith(b"\x93NUMPY"):
+        return tables.read_npy
+    if start.startswith(b"PK\x03\x04") and ending == ".npz":
+        return tables.read_npz
+    if ending == ".pcd" or start.startswith(b"# .PCD"):
+        return pcd.read_pcd
+    if ending == ".off" or start.split(b"\n", 1)[0].strip() in (b"OFF", b"COFF", b"NOFF"):
+        return meshes.read_off
+    if ending == ".obj":
+        return meshes.read_obj
+    if ending == ".stl":
+        return meshes.read_mesh
+    if start.startswith(b"glTF"):
+        return meshes.read_glb
+    text = b"\0" not in start
+    if ending in (".xyz", ".xyzn", ".txt", ".csv", ".asc", ".pts") and text:
+        return tables.read_text
+    raise CloudError(f"{path}: not a point cloud that can be read; known formats: {KNOWN_FORMATS}")
+
+
+def _read_ply(path: Path, mesh_samples: int) -> RawCloud:
+    header = ply.read_header(path)
+    if header.count("face") and mesh_samples:
+        cloud = meshes.read_mesh(path, mesh_samples)
+    else:
+        columns = ply.read_scalars(path, header)
+        points = stack(columns, "xyz")
+        if points is None:
+            raise CloudError(
+                f"{path}: its vertices have the properties {', '.join(columns) or '(none)'}; "
+                "x, y and z are needed"
+            )
+        cloud = RawCloud(points, stack(columns, ("nx", "ny", "nz")))
+        cloud.colours, cloud.intensity = colours_of(columns), intensity_of(columns)
+    for comment in header.comments:
+        word, _, rest = comment.partition(" ")
+        if word == "unit" and rest.strip() in METRES:
+            cloud.unit = rest.strip()
+        elif word == "frame" and rest:
+            cloud.frame = rest
+        elif word == "sensor":
+            cloud.sensors = np.vstack([cloud.sensors, _place(path, rest)])
+    return cloud
+
+
+def _place(path: Path, words: str) -> np.ndarray:
+    try:
+        place = np.array([float(word) for word in words.split()])
+    except ValueError:
+        place = np.empty(0)
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise CloudError(f"{path}: comment 'sensor {words[:60]}': three numbers are needed")
+    return place

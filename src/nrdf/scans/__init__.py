@@ -1,0 +1,1 @@
+"""Scans as they come: simulated, cleaned, aligned with their category's frame."""

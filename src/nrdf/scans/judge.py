@@ -1,0 +1,141 @@
+"""How well a field can explain a cloud in a hypothesised frame.
+
+Surfaces of a few known members of the category are mapped onto the cloud by the field (C of their
+descriptors and the cloud's embedding). In the right frame they come to lie on it, on the right
+sides; in a wrong one the field puts seats where backs are, off the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from nrdf.cloud import PointCloud
+from nrdf.errors import ModelError
+from nrdf.field.base import Inverse
+from nrdf.geometry import thin
+from nrdf.regions.association import NORMAL_WEIGHT
+from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.model import Model
+from nrdf.shapes.families import FAMILY_NAMES, get_family
+
+FIRST_SEED = 900_000  # of the members that serve as prototypes; no training set has them
+PROTOTYPES = 8
+_COARSE_POINTS = 128  # of each prototype
+_FINE_POINTS = 256
+_JUDGED_POINTS = 512  # of the cloud
+_COARSE_TOLERANCE, _FINE_TOLERANCE = 0.05, 0.03
+"""Distance at which a point counts half as explained, canonical."""
+_UNSEEN = 0.5  # weight of the prototypes' points: what they lie on may not have been seen
+_DEPTH = 0.02  # how far below and above the surface the field is asked for occupancy, canonical
+_DOUBT, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
+_BATCH = 36
+
+
+class Judge:
+    """Prototypes of a model's category, their descriptors known."""
+
+    def __init__(self, model: Model, prototypes: Sequence[PointCloud] = ()) -> None:
+        """`prototypes` are canonical in orientation; members of the category's family unless given.
+
+        Raises ModelError if there are none and the category has no family.
+        """
+        self.model = model
+        given = list(prototypes) or family_prototypes(model.category)
+        self.prototypes = len(given)
+        described = []
+        with torch.inference_mode():
+            for cloud in given:
+                embedded = model.embed(cloud)
+                chosen = thin(embedded.points, _FINE_POINTS, np.random.default_rng(0))
+                chosen = np.random.default_rng(0).permutation(chosen)
+                points, normals = (
+                    model.tensor(values[chosen])[None]
+                    for values in (embedded.points, embedded.normals)
+                )
+                described.append(model.field.describe(embedded.z, points, normals))
+        self._k = torch.cat(described)  # (p, _FINE_POINTS, d_k)
+
+    @property
+    def usual_cost(self) -> float:
+        return 0.0
+
+    def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Cost (h,) of h hypotheses: clouds (h, n, 3) in hypothesised canonical frames.
+
+        Mean over the prototypes of the robust distance (Geman and McClure; 0 to 1) from the cloud
+        to the mapped prototype, plus half that of the way back.
+        """
+        parts = []
+        for start in range(0, len(points), _BATCH):
+            part = slice(start, start + _BATCH)
+            q, n = self.model.tensor(points[part]), self.model.tensor(normals[part])
+            parts.append(self._explained(q, n, q, n, _COARSE_POINTS, _COARSE_TOLERANCE)[0])
+        return torch.cat(parts).cpu().numpy()
+
+    def fine(
+        self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray
+    ) -> np.ndarray:
+        """Cost (h,) as of `coarse`, more exactly, with what the field doubts.
+
+        whole, whole_normals: (h, m, 3) what is embedded: the cloud, completed by its mirror image
+        where it has one. Added are the error that the field expects of itself on the prototypes,
+        and how far it is from finding matter just below the cloud's points and none above.
+        """
+        q, n, w, wn = (self.model.tensor(part) for part in (points, normals, whole, whole_normals))
+        cost, inverse, z = self._explained(q, n, w, wn, _FINE_POINTS, _FINE_TOLERANCE)
+        with torch.inference_mode():
+            if inverse.log_error is not None:
+                cost = cost + _DOUBT * inverse.log_error.mean(1)
+            below, above = (
+                self.model.field.occupancy(z, q + _DEPTH * side * n) for side in (-1, 1)
+            )
+            wrong = torch.nn.functional.softplus(-below) + torch.nn.functional.softplus(above)
+            return (cost + _INSIDE * wrong.mean(1)).cpu().numpy()
+
+    def _explained(
+        self, q: Tensor, n: Tensor, w: Tensor, wn: Tensor, count: int, tolerance: float
+    ) -> tuple[Tensor, Inverse, Tensor]:
+        """Cost (h,) of clouds q, n (h, ., 3), embedded as w, wn; what C said; embeddings."""
+        field, h = self.model.field, len(q)
+        with torch.inference_mode():
+            z = field.embed(w, wn)
+            k = self._k[:, :count].flatten(0, 1)
+            inverse = field.invert(z, k.expand(h, -1, -1))
+            mapped = inverse.points
+            seen = q[:, :_JUDGED_POINTS]
+            if inverse.normals is not None:
+                mapped = torch.cat([mapped, NORMAL_WEIGHT * inverse.normals], dim=-1)
+                seen = torch.cat([seen, NORMAL_WEIGHT * n[:, :_JUDGED_POINTS]], dim=-1)
+            mapped = mapped.unflatten(1, (self.prototypes, count)).flatten(0, 1)
+            seen = seen[:, None].expand(-1, self.prototypes, -1, -1).flatten(0, 1)
+            square = torch.cdist(seen, mapped).square()
+            there, back = (
+                (least / (least + tolerance**2)).mean(1)
+                for least in (square.amin(2), square.amin(1))
+            )
+            return (there + _UNSEEN * back).view(h, -1).mean(1), inverse, z
+
+
+def family_prototypes(category: str) -> list[PointCloud]:
+    """Members of a category's family that no training set holds. Raises ModelError without one."""
+    if category not in FAMILY_NAMES:
+        raise ModelError(
+            f"the category '{category}' has no parametric family (there are "
+            f"{', '.join(FAMILY_NAMES)}), so alignment needs an example: give a --reference"
+        )
+    family = get_family(category)
+    rng = np.random.default_rng(0)
+    found = []
+    for seed in range(FIRST_SEED, FIRST_SEED + PROTOTYPES):
+        surface = family.member(seed).sample_surface(2048, rng)
+        found.append(PointCloud(surface.points, surface.normals))
+    return found
+
+
+def judged_subset(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the points that hypotheses are judged by, in random order."""
+    return np.random.default_rng(0).permutation(encoder_subset(points, count))

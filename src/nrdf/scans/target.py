@@ -1,0 +1,106 @@
+"""A scan on its way into a model: cleaned, aligned, embedded, and its results on the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nrdf.cloud import PointCloud, in_metres
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.match import Match
+from nrdf.scans.align import Alignment, align_scan
+from nrdf.scans.clean import Cleaned, clean_scan
+from nrdf.scans.judge import Judge
+from nrdf.similarity import Similarity
+from nrdf.units import METRES, Unit, find_unit
+
+_FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
+_MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
+
+
+@dataclass(frozen=True)
+class AlignedScan:
+    """scan: as it was read; cleaned: the object in it; alignment: its poses; unit: of the scan."""
+
+    judge: Judge
+    scan: PointCloud
+    cleaned: Cleaned
+    alignment: Alignment
+    unit: Unit
+
+    def embed(self) -> Embedded:
+        """The object as the model's field sees it, in the likeliest pose."""
+        best = self.alignment.best
+        return self.judge.model.embed(self.cleaned.cloud, best.pose, best.symmetry > _MIRRORED)
+
+    def embed_in_metres(self, unit: str) -> Embedded:
+        """As `embed`, of the object in metres, its scan being in `unit`."""
+        best = self.alignment.best
+        pose = best.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
+        cloud = in_metres(self.cleaned.cloud, unit)
+        return self.judge.model.embed(cloud, pose, best.symmetry > _MIRRORED)
+
+    def in_scan(self, match: Match) -> Match:
+        """A match on the object, its indices those of the scan's points."""
+        return replace(match, indices=self.cleaned.kept[match.indices])
+
+    @property
+    def fits(self) -> bool:
+        """Whether the object looks like one of the category at all."""
+        return self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+
+    @property
+    def doubts(self) -> list[str]:
+        """What a person should know before relying on the pose, in whole sentences."""
+        found = []
+        if self.cleaned.others:
+            found.append(
+                f"{self.cleaned.others + 1} objects of comparable size are in view; the largest "
+                "was taken: crop the scan to take another"
+            )
+        category = self.judge.model.category
+        if not self.fits:
+            found.append(
+                f"the scan does not look like a {category}: the field explains it at a cost of "
+                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual"
+            )
+        if self.alignment.is_ambiguous:
+            degrees = [f"{np.degrees(c.yaw):.0f}°" for c in self.alignment.likely]
+            found.append(
+                f"the pose is ambiguous: yaws of {', '.join(degrees)} explain the scan about "
+                "equally; look at the picture, or scan more sides"
+            )
+        if self.unit.doubt:
+            found.append(f"the unit may be wrong: {self.unit.doubt}")
+        return found
+
+
+def bring_in(
+    judge: Judge,
+    scan: PointCloud,
+    up: np.ndarray | None = None,
+    sensors: np.ndarray | None = None,
+    unit: str | None = None,
+    skip: Sequence[str] = (),
+) -> AlignedScan:
+    """Clean and align a scan.
+
+    up: (3,) unit in the scan's frame; where it is not given, the floor's, or else searched.
+    sensors: (s, 3) where they stood, instead of what the file says. unit: instead of the file's.
+    skip: steps of cleaning to leave out. Raises CloudError where no object is left.
+    """
+    scan = replace(
+        scan,
+        sensors=scan.sensors if sensors is None else sensors,
+        unit=scan.unit if unit is None else unit,
+    )
+    cleaned = clean_scan(scan, up, skip)
+    if up is None and cleaned.floor is not None:
+        up = cleaned.floor.normal
+    alignment = align_scan(judge, cleaned.cloud, up)
+    longest = alignment.best.pose.scale
+    return AlignedScan(
+        judge, scan, cleaned, alignment, find_unit(scan.unit, longest, judge.model.category)
+    )
