@@ -18,6 +18,8 @@ ABSENT, NOT_OBSERVED = "absent", "not observed"
 _EXISTENCE, _ERROR, _DISTANCE, _BIAS = -1.24, 2.59, 3.03, -2.18
 _USUAL_DISTANCE = 0.05  # canonical, of the 80 % quantile of the mapped points from the target
 _SEEN = 0.06  # distance (position and weighted normal) within which a mapped point was observed
+_SURE = 0.8  # probability of absence from which a region is emptied: worse than one too many is one
+# that is there and not found, and the regression is older than the zoo's chairs and planes
 _LEAST_SEEN = 0.2  # share of a region's mapped points that makes it observed
 
 
@@ -50,7 +52,7 @@ def find_presence(
         score += _ERROR * float(np.log(error / usual_error).mean())
     absent = float(1 / (1 + np.exp(-score)))
     observed = float((distance < _SEEN).mean())
-    if absent > 0.5:
+    if absent > _SURE:
         return Presence(ABSENT, absent, observed)
     if observed < _LEAST_SEEN:
         return Presence(NOT_OBSERVED, (1 - absent) * (1 - observed), observed)
