@@ -116,6 +116,17 @@ def test_a_line_is_cut_where_the_target_has_no_surface(model):
     assert np.abs(taught.positions[kept, 2]).min() > 0.06
 
 
+def test_a_line_is_cut_where_the_surface_is_torn(model):
+    """A panel carried to two slats: what would lie in the gap goes to their edges."""
+    slats = cloud(count=12_000, seed=1)
+    slats = slats.select(~((slats.normals[:, 1] > 0.5) & (np.abs(slats.points[:, 2]) < 0.03)))
+    way = Correspondence(taught_on(model, cloud(), 1.0), model.embed(slats))
+    carried, lost = way.carry([line_on_top(count=60)], 0.025)
+    assert len(carried) == 2 and lost == 0
+    for line in carried:
+        assert np.linalg.norm(np.diff(line.positions, axis=0), axis=1).max() < 0.025
+
+
 def test_nothing_is_carried_from_nothing(way):
     assert way.carry([], 0.025) == ((), 0)
 

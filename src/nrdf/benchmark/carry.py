@@ -66,7 +66,7 @@ class CarryResult:
 def evaluate_carry(
     model: Model,
     category: str,
-    pairs: int = 20,
+    pairs: int = 50,
     progress: Callable[[int, int], None] | None = None,
 ) -> CarryResult:
     """Carry rasters on every region between `pairs` pairs of unseen members.

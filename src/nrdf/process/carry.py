@@ -16,17 +16,18 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.geometry import thin
 from nrdf.process.frames import surface_frames, travel_of
-from nrdf.process.surface import Surface, unit
+from nrdf.process.surface import SAME_SIDE, Surface, unit
 from nrdf.process.taught import TaughtLine, feet_under
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.model import Embedded, Taught
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
-"""A waypoint has a counterpart where C's place is at most so far off the target's points, in all
-and sideways (beyond an edge, or in a hole), as shares of the longest side, not counting the
-distance between points; and where C trusts it."""
-_KEPT = 1.2  # spacings of points that a place may lie beside one; what is more lies off the edge
+"""A waypoint has a counterpart where C's place is at most so far off the target's points, in all,
+and beyond an edge or in a hole, as shares of the longest side, not counting the distance between
+points; and where C trusts it."""
+_AROUND = 12  # points that tell whether a place is on the surface between them
+_TORN, _GAP = 1.5, 1.2  # times its length on the reference, and spacings, that a step may have
 _ANCHORS = 1200  # points of the reference whose places are settled
 _BLENDED, _BLEND = 8, 0.005  # anchors that a place follows, and the distance that softens it
 _SETTLING = RegistrationSettings(
@@ -121,16 +122,30 @@ class Correspondence:
         arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._settled[near])
         facing = unit(mapped.normals)
         nearest = self._tree.query(oriented_features(arrived, facing, NORMAL_WEIGHT))[1]
-        start, outward = embedded.points[nearest], embedded.normals[nearest]
-        offset = arrived - start
+        start, outward = embedded.original(embedded.points[nearest]), embedded.normals[nearest]
+        offset = embedded.original(arrived) - start
         sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
-        length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        spacing = self.target.spacing / embedded.scale
-        kept = start + sideways * np.minimum(1.0, _KEPT * spacing / np.maximum(length, 1e-12))
-        found, found_normals = self.target.project(embedded.original(kept), outward)
-        exists = np.linalg.norm(offset, axis=1) <= FARTHEST + spacing
-        exists &= length[:, 0] <= BEYOND + spacing
+        beyond = self._beyond(start, sideways, outward)
+        kept = start + sideways * (1.0 - beyond / np.maximum(_lengths(sideways), 1e-12))[:, None]
+        found, found_normals = self.target.project(kept, outward)
+        size, spacing = embedded.scale, self.target.spacing
+        exists = _lengths(offset) <= FARTHEST * size + spacing
+        exists &= beyond <= BEYOND * size + spacing
         return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
+
+    def _beyond(self, start: np.ndarray, sideways: np.ndarray, outward: np.ndarray) -> np.ndarray:
+        """How far (m,) places `start + sideways` (m, 3) lie off the edge of the target's points.
+
+        A place with points of its side around and ahead of it is on the surface between them.
+        """
+        target, length = self.target, _lengths(sideways)
+        near = np.arange(1, min(_AROUND, len(target.points)) + 1)
+        distance, near = target.tree.query(start + sideways, near)
+        alike = np.einsum("mka,ma->mk", target.normals[near], outward) > SAME_SIDE
+        alike &= distance < 2.0 * target.spacing
+        ahead = np.einsum("mka,ma->mk", target.points[near] - start[:, None], unit(sideways))
+        reach = np.where(alike, ahead, 0.0).max(axis=1)
+        return np.maximum(length - np.maximum(reach, 0.0), 0.0)
 
     def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """A direction (3,) at a region of the reference, unit length, as it is on the target.
@@ -157,7 +172,8 @@ class Correspondence:
     ) -> tuple[tuple[CarriedLine, ...], int]:
         """Lines on the reference as lines on the target, and how many waypoints have no place.
 
-        A line is cut where waypoints have no counterpart. The tool's height over the surface, and
+        A line is cut where waypoints have no counterpart, and where the surface is torn between
+        two of them, so that no tool is driven across a gap. The tool's height over the surface, and
         its angles to travel and normal, stay; a flat tool of `tool_radius_m` feels the normals.
         """
         if not lines:
@@ -174,10 +190,14 @@ class Correspondence:
         # Where there is no line to tell the travel, a short way along tool x is mapped.
         ahead, ahead_normals = source.project(feet + 2 * source.spacing * turns[:, :, 0], normals)
         step = self.places(ahead, ahead_normals)[0] - found
+        grown = self.embedded.scale / self.reference.taught.reference.scale
         carried, lost = [], int((~exists).sum())
         for number in range(len(lines)):
             mine = np.flatnonzero(owner == number)
-            for run in _runs(exists[mine]):
+            step_there = _lengths(np.diff(found[mine], axis=0))
+            step_here = _lengths(np.diff(feet[mine], axis=0))
+            torn = step_there > _TORN * grown * step_here + _GAP * self.target.spacing
+            for run in _runs(exists[mine], torn):
                 at = mine[run]
                 frames = _frames(feet[at], felt[at], turns[at, :, 0], source.spacing)
                 there = _frames(found[at], found_felt[at], step[at], self.target.spacing)
@@ -194,6 +214,10 @@ def surface_of(embedded: Embedded) -> Surface:
     return Surface(embedded.original(embedded.points), embedded.normals)
 
 
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(vectors, axis=1)
+
+
 def _frames(
     points: np.ndarray, normals: np.ndarray, alone: np.ndarray, spacing: float
 ) -> np.ndarray:
@@ -204,9 +228,11 @@ def _frames(
     return surface_frames(travel, normals)
 
 
-def _runs(good: np.ndarray) -> list[np.ndarray]:
-    """Indices of each unbroken stretch of True."""
+def _runs(good: np.ndarray, torn: np.ndarray) -> list[np.ndarray]:
+    """Indices of each stretch of True in `good` (n,) that `torn` (n - 1,) between two does not
+    break."""
     places = np.flatnonzero(good)
     if not len(places):
         return []
-    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    broken = (np.diff(places) > 1) | torn[places[:-1]]
+    return np.split(places, np.flatnonzero(broken) + 1)
