@@ -25,14 +25,21 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score methods: on scans (bsrc), exact truth (families, carry), shapes themselves (shape).
+    """Score: on scans (bsrc), exact truth (families, carry), shapes (shape), planning (toolpaths).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
     from nrdf.commands.evaluate_carry import carry
     from nrdf.commands.evaluate_shape import shape
+    from nrdf.commands.evaluate_toolpaths import toolpaths
 
-    return {"bsrc": bsrc, "families": families, "carry": carry, "shape": shape}
+    return {
+        "bsrc": bsrc,
+        "families": families,
+        "carry": carry,
+        "toolpaths": toolpaths,
+        "shape": shape,
+    }
 
 
 def bsrc(

@@ -220,6 +220,9 @@ def _lines(
     places = np.concatenate(even)
     flat, along = patch.at(places)
     contacts, _ = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
+    # A place that moves farther has ended on another sheet.
+    far = np.linalg.norm(contacts - flat, axis=1) > 0.5 * patch.spacing
+    contacts[far] = flat[far]
     normals = patch.smooth_normals(places, strategy.tool_radius_m)
     normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
     cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
