@@ -51,8 +51,9 @@ class Work:
 
 @dataclass(frozen=True)
 class PathResult:
-    """One region's tool path. width_m: of its largest patch; near: share of the process waypoints
-    within `NEAR_M` of the exact surface, None where that is not known; seconds: CPU time."""
+    """One region's tool path. width_m: diameter of the largest disc inside the region; near: share
+    of the process waypoints within `NEAR_M` of the exact surface, None where that is not known;
+    seconds: CPU time."""
 
     object: str
     region: str
@@ -117,7 +118,7 @@ def evaluate_toolpaths(
             segments = plan(surface, region, strategy)
             seconds = shared + time.process_time() - start
             figures = measure(surface, region, strategy, segments)
-            width = patches_of(surface, region)[0].extent[1]
+            width = 2.0 * max(patch.border.deepest for patch in patches_of(surface, region))
             near = None if item.exact is None else _near(item.exact, segments, strategy)
             results.append(PathResult(item.name, name, width, figures, near, seconds))
         if progress is not None:

@@ -51,7 +51,7 @@ def toolpaths(
             results = evaluate_toolpaths(objects, strategy, lambda n: progress(n, n))
         for what, chosen in (
             ("all regions", results),
-            ("those wider than the footprint", [r for r in results if r.wide]),
+            ("those that the footprint fits into", [r for r in results if r.wide]),
         ):
             title = f"\n{category}, {source}, {trajectory}: {what}, {len(chosen)}"
             shown = table(title, "", "bar", "met by", "median", "worst")

@@ -101,17 +101,8 @@ def _fit(
     held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
     lean = lean_rotation(strategy.lead_rad, strategy.tilt_rad)
     tails = -(held * lean.inv()).as_matrix()[:, :, 2]
-    # At an edge there are several sheets, each found from a normal of its own; the nearest counts.
-    near = surface.normals[surface.tree.query(everywhere, min(8, len(surface.points)))[1]]
-    facing = np.einsum("nka,na->nk", near, tails) > _FACING
-    beneath = near[np.arange(len(near)), facing.argmax(axis=1)]
-    off = np.min(
-        [
-            np.linalg.norm(surface.project(everywhere, normals)[0] - everywhere, axis=1)
-            for normals in (tails, beneath)
-        ],
-        axis=0,
-    )
+    _, _, off = surface.nearest(everywhere, tails)
+    off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
     smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
     asked = []
     cuts = np.cumsum([len(line) for line in contacts])[:-1]

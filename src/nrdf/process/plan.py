@@ -100,12 +100,9 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
     blocks: list[list[Line]] = []
-    for strokes_of in _sweeps(patches, strategy):
-        sweep: list[list[Line]] = []
-        for patch, parts in strokes_of:
-            found = iter(_lines(surface, patch, [s for part in parts for s in part], strategy))
-            sweep += [[next(found) for _ in part] for part in parts]
-        blocks += _nearest_first(sweep)
+    for sweep in _sweeps(patches, strategy):
+        found = [block for patch, parts in sweep for block in _on(surface, patch, parts, strategy)]
+        blocks += _nearest_first(found)
     if not blocks:
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
@@ -202,10 +199,11 @@ def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[floa
     ]
 
 
-def _lines(
-    surface: Surface, patch: Patch, strokes: Sequence[Stroke], strategy: Strategy
-) -> list[Line]:
-    """Strokes brought onto the surface, their waypoints evenly spaced."""
+def _on(
+    surface: Surface, patch: Patch, parts: Sequence[Sequence[Stroke]], strategy: Strategy
+) -> list[list[Line]]:
+    """Strokes brought onto the surface, their waypoints evenly spaced: a block of lines a part."""
+    strokes = [stroke for part in parts for stroke in part]
     if not strokes:
         return []
     cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
@@ -219,16 +217,24 @@ def _lines(
         even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
     places = np.concatenate(even)
     flat, along = patch.at(places)
-    contacts, _ = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
-    # A place that moves farther has ended on another sheet.
-    far = np.linalg.norm(contacts - flat, axis=1) > 0.5 * patch.spacing
-    contacts[far] = flat[far]
-    normals = patch.smooth_normals(places, strategy.tool_radius_m)
+    outward = unit(np.cross(along[:, 0], along[:, 1]))
+    contacts, normals, off = surface.nearest(flat, outward, 0.25)
     normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
-    cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
-    return [
-        Line(*line) for line in zip(np.split(contacts, cuts), np.split(normals, cuts), strict=True)
-    ]
+    # Where thin parts are hardly sampled, there may be no surface under a place.
+    there = off < patch.spacing
+    blocks, first = [], 0
+    ends = iter(np.cumsum([len(line) for line in even]))
+    for part in parts:
+        block = []
+        for _ in part:
+            last = int(next(ends))
+            found = first + np.flatnonzero(there[first:last])
+            runs = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+            block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
+            first = last
+        if block:
+            blocks.append(block)
+    return blocks
 
 
 def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
