@@ -148,7 +148,8 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
             around = _surroundings(surface, own, hops)
             edges = _edges_within(surface, around)
             flat = unroll(surface.points[around], surface.normals[around], edges, surface.spacing)
-            bent = flat.error[np.isin(around, own)] > most
+            mine = np.isin(around, own)
+            bent = (flat.error[mine] > most) | _folded(surface.points[around], flat.uv)[mine]
             if bent.mean() <= _BENT_SHARE:
                 break
         if depth < _DEEPEST and bent.mean() > _BENT_SHARE:
@@ -172,6 +173,13 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
         _patch(surface, around, flat, _labels(owner[around], k, len(found)))
         for k, (_, around, flat) in enumerate(found)
     )
+
+
+def _folded(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Whether (n,) points (n, 3) lie over others in the plane uv (n, 2) that are elsewhere."""
+    away, near = cKDTree(uv).query(uv, min(4, len(uv)))
+    apart = np.linalg.norm(points[near] - points[:, None], axis=2)
+    return (apart > 3.0 * away + 1e-9).any(axis=1)
 
 
 def _labels(owner: np.ndarray, patch: int, nobody: int) -> np.ndarray:
