@@ -7,7 +7,7 @@ retrieved.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,9 @@ from nrdf.benchmark.bsrc import read_bsrc
 from nrdf.benchmark.family import CLOUD_POINTS, FIRST_SEED
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
+from nrdf.process.border import OWN
 from nrdf.process.coverage import Measures, measure
-from nrdf.process.patch import patches_of
+from nrdf.process.patch import Patch, patches_of
 from nrdf.process.plan import Strategy, plan
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
@@ -51,21 +52,23 @@ class Work:
 
 @dataclass(frozen=True)
 class PathResult:
-    """One region's tool path. width_m: diameter of the largest disc inside the region; near: share
-    of the process waypoints within `NEAR_M` of the exact surface, None where that is not known;
-    seconds: CPU time."""
+    """One region's tool path. width_m: diameter of the largest disc inside the region; bend_rad:
+    angle between a point's normal and the smooth one that the tool feels, the 95th percentile;
+    near: share of the process waypoints within `NEAR_M` of the exact surface, None where that is
+    not known; seconds: CPU time."""
 
     object: str
     region: str
     width_m: float
+    bend_rad: float
     measures: Measures
     near: float | None
     seconds: float
 
     @property
     def wide(self) -> bool:
-        """Whether the tool's footprint fits into the region."""
-        return self.width_m >= 2.0 * STRATEGY.tool_radius_m
+        """Whether the tool's footprint fits: the region is no rim, and no thinner rod."""
+        return self.width_m >= 2.0 * STRATEGY.tool_radius_m and self.bend_rad <= np.pi / 4
 
 
 def family_members(category: str, members: int) -> Iterator[Work]:
@@ -118,12 +121,23 @@ def evaluate_toolpaths(
             segments = plan(surface, region, strategy)
             seconds = shared + time.process_time() - start
             figures = measure(surface, region, strategy, segments)
-            width = 2.0 * max(patch.border.deepest for patch in patches_of(surface, region))
+            width, bend = _shape(patches_of(surface, region))
             near = None if item.exact is None else _near(item.exact, segments, strategy)
-            results.append(PathResult(item.name, name, width, figures, near, seconds))
+            results.append(PathResult(item.name, name, width, bend, figures, near, seconds))
         if progress is not None:
             progress(number + 1)
     return results
+
+
+def _shape(patches: Sequence[Patch]) -> tuple[float, float]:
+    """`width_m` and `bend_rad` of a region."""
+    cosines = []
+    for patch in patches:
+        own = patch.label == OWN
+        smooth = patch.smooth_normals(patch.uv[own], STRATEGY.tool_radius_m)
+        cosines.append(np.einsum("na,na->n", smooth, patch.normals[own]))
+    bend = float(np.arccos(np.clip(np.quantile(np.concatenate(cosines), 0.05), -1.0, 1.0)))
+    return 2.0 * max(patch.border.deepest for patch in patches), bend
 
 
 def _near(exact: Exact, segments: Iterable[Segment], strategy: Strategy) -> float:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.contour import contour, spiral
-from nrdf.process.frames import steady, surface_frames, tool_quaternions, travel_of
+from nrdf.process.frames import lean_rotation, steady, surface_frames, travel_of
 from nrdf.process.patch import Patch, patches_of
 from nrdf.process.raster import Stroke, raster
 from nrdf.process.surface import Surface, unit
@@ -144,13 +144,13 @@ def _held(
     contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Positions and quaternions of a tool along lines on the surface."""
-    held = []
-    for line, outward in zip(contacts, normals, strict=True):
-        travel = travel_of(line, 0.5 * strategy.stepover_m)
-        turns = tool_quaternions(travel, outward, strategy.lead_rad, strategy.tilt_rad)
-        axis = Rotation.from_quat(turns).as_matrix()[:, :, 2]
-        held.append((line - strategy.standoff_m * axis, turns))
-    return held
+    travel = np.concatenate([travel_of(line, 0.5 * strategy.stepover_m) for line in contacts])
+    upright = surface_frames(travel, np.concatenate(normals))
+    turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    quaternions = [steady(part) for part in np.split(turned.as_quat(), cuts)]
+    return list(zip(np.split(places, cuts), quaternions, strict=True))
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:

@@ -22,7 +22,7 @@ _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SHEETS = 6  # normals to start from
-_ROUNDS, _SETTLED = 8, 5e-3  # until nothing moves by more, in spacings or rad
+_ROUNDS, _SETTLED = 12, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
