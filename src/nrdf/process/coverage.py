@@ -214,14 +214,14 @@ def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> n
         other = np.abs(walked[i] - walked[j]) > np.minimum(3.0 * away, 2.5 * stepover)
         kept = other & (np.abs(beside) > 0.5 * away) & (away > 1e-9)
         i, j, key = i[kept], j[kept], (2 * i + (beside > 0.0))[kept]
-        order = np.lexsort((away[kept], key))
+        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
+        order = np.lexsort((chord, key))
         _, first = np.unique(key[order], return_index=True)
-        i, j = i[order][first], j[order][first]
+        i, j, chord = (values[order][first] for values in (i, j, chord))
         whole = ~end[j]  # what goes on past a line's end is not beside it
         for share in (0.25, 0.5, 0.75):
             whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
-        i, j = i[whole], j[whole]
-        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
+        i, j, chord = i[whole], j[whole], chord[whole]
         turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
         half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
         found.append(chord / np.sinc(half / np.pi))  # the arc over the chord
