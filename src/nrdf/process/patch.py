@@ -110,7 +110,7 @@ class Patch:
         """
         grid = self.border.grid
         area = grid.nodes[self.border.clearance(grid.nodes, 0.0) > 0.0]
-        area = area if len(area) else self.uv[self.label == OWN]
+        area = area if len(area) > 2 else self.uv[self.label == OWN]
         squared, axes = np.linalg.eigh(np.cov(area.T))
         angles = np.radians(np.arange(90.0))
         if squared[1] > _LONG * squared[0]:
