@@ -13,6 +13,7 @@ from nrdf.process.coverage import measure
 from nrdf.process.plan import TRAJECTORIES, Strategy, drive, plan
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
+from nrdf.shapes.families import get_family
 from surfaces import SPACING, board, dome, slats, tube, two_sided
 
 STRATEGY = Strategy(stepover_m=0.025, spacing_m=0.01, tool_radius_m=0.025)
@@ -70,6 +71,20 @@ def test_raster_lines_are_no_farther_apart_than_asked(shape):
     # A dome cannot be unrolled without stretch.
     assert found.line_spacing_worst_m < (1.2 if shape == "dome" else 1.1) * STRATEGY.stepover_m
     assert found.line_spacing_mean_m > 0.8 * STRATEGY.stepover_m
+
+
+def test_every_region_of_a_chair_has_lines_that_stay_on_it():
+    family = get_family("chair")
+    sample = family.member(1_000_003).sample_surface(8192, np.random.default_rng(0))
+    surface = Surface(0.9 * sample.points, sample.normals)
+    named = family.region_of(sample.coordinates)
+    off = []
+    for name in ("seat", "seat-bottom", "back-front", "back-back", "leg-left-front"):
+        for line in processes(plan(surface, np.flatnonzero(named == name), STRATEGY)):
+            steps = np.linalg.norm(np.diff(line.positions, axis=0), axis=1)
+            assert steps.max() < 2.0 * STRATEGY.spacing_m + surface.spacing
+            off.append(surface.nearest(line.positions, -frames(line)[:, :, 2])[2])
+    assert np.quantile(np.concatenate(off), 0.97) < 1e-3
 
 
 def test_lines_go_along_the_direction_projected_to_the_surface():

@@ -218,7 +218,8 @@ def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> n
         order = np.lexsort((chord, key))
         _, first = np.unique(key[order], return_index=True)
         i, j, chord = (values[order][first] for values in (i, j, chord))
-        whole = ~end[j]  # what goes on past a line's end is not beside it
+        # What goes on past a line's end is not beside it, and what is far off no neighbour.
+        whole = ~end[j] & (chord < 2.5 * stepover)
         for share in (0.25, 0.5, 0.75):
             whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
         i, j, chord = i[whole], j[whole], chord[whole]

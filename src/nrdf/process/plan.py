@@ -24,6 +24,7 @@ Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
 
 
 @dataclass(frozen=True)
@@ -210,7 +211,8 @@ def _on(
     even = []
     flat = patch.at(np.concatenate(strokes))[0]
     for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
-        steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+        plane = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
+        steps = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1), _JUMP * plane)
         walked = np.concatenate([[0.0], np.cumsum(steps)])
         count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
         at = np.linspace(0.0, walked[-1], count + 1)
@@ -222,6 +224,8 @@ def _on(
     normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
     # Where thin parts are hardly sampled, there may be no surface under a place.
     there = off < patch.spacing
+    farthest = 2.0 * strategy.spacing_m + 0.5 * patch.spacing
+    jump = np.linalg.norm(np.diff(contacts, axis=0), axis=1) > farthest
     blocks, first = [], 0
     ends = iter(np.cumsum([len(line) for line in even]))
     for part in parts:
@@ -229,7 +233,8 @@ def _on(
         for _ in part:
             last = int(next(ends))
             found = first + np.flatnonzero(there[first:last])
-            runs = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+            cuts = (np.diff(found) > 1) | jump[found[:-1]]
+            runs = np.split(found, np.flatnonzero(cuts) + 1)
             block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
             first = last
         if block:
