@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import nrdf
-from nrdf.process.carry import Correspondence, TaughtSurface
+from nrdf.process.carry import carry
+from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.frames import tool_quaternions
 from nrdf.process.taught import TaughtLine
 from nrdf.regions.match import Mapped
@@ -35,8 +36,9 @@ def taught_on(model, reference, scale):
     taught.map_points = lambda at, target: places(
         reference.points[at], reference.normals[at], target
     )
-    taught.map_surface = lambda target: places(reference.points, reference.normals, target)
-    return TaughtSurface(taught)
+    surface = TaughtSurface(taught)
+    surface.mirrored = taught  # to whom all the same is told of mirror images
+    return surface
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +63,7 @@ def axes(line):
 
 def test_waypoints_go_where_the_surface_goes(way):
     taught = line_on_top()
-    (carried,), lost = way.carry([taught], 0.025)
+    (carried,), lost = carry(way, [taught], 0.025)
     assert lost == 0 and carried.taught == 0
     np.testing.assert_array_equal(carried.waypoints, np.arange(12))
     np.testing.assert_allclose(carried.positions, taught.positions * SCALE, atol=0.01)
@@ -70,13 +72,13 @@ def test_waypoints_go_where_the_surface_goes(way):
 
 
 def test_the_height_over_the_surface_is_kept_not_scaled(way):
-    (carried,), _ = way.carry([line_on_top(height=0.15)], 0.025)
+    (carried,), _ = carry(way, [line_on_top(height=0.15)], 0.025)
     np.testing.assert_allclose(carried.positions[:, 1] - SIZE[1] * SCALE[1] / 2, 0.15, atol=2e-3)
 
 
 @pytest.mark.parametrize(("lead", "tilt"), [(0.0, 0.0), (0.3, 0.0), (0.0, -0.4), (0.2, 0.3)])
 def test_the_tool_keeps_its_angles_to_travel_and_normal(way, lead, tilt):
-    (carried,), _ = way.carry([line_on_top(lead=lead, tilt=tilt)], 0.025)
+    (carried,), _ = carry(way, [line_on_top(lead=lead, tilt=tilt)], 0.025)
     travel = SCALE * [0.2, 0.0, 0.5]
     travel = np.broadcast_to(travel / np.linalg.norm(travel), (12, 3))
     asked = tool_quaternions(travel, np.broadcast_to(UP, (12, 3)), lead, tilt)
@@ -87,7 +89,7 @@ def test_the_tool_keeps_its_angles_to_travel_and_normal(way, lead, tilt):
 def test_a_waypoint_alone_keeps_its_angles_too(way):
     single = line_on_top(tilt=0.3)
     single = TaughtLine(single.positions[:1], single.quaternions_xyzw[:1])
-    (carried,), _ = way.carry([single], 0.025)
+    (carried,), _ = carry(way, [single], 0.025)
     x, _, z = axes(carried)
     np.testing.assert_allclose(-z @ UP, np.cos(0.3), atol=0.01)
     travel = SCALE * [0.2, 0.0, 0.5]
@@ -99,7 +101,7 @@ def test_a_tool_near_a_thin_edge_stays_on_its_side(model):
     same = Correspondence(thin, model.embed(cloud((0.5, 0.9, 0.02), seed=1)))
     places = np.stack([np.linspace(-0.2, 0.2, 9), np.zeros(9), np.full(9, 0.01)], axis=1)
     turns = tool_quaternions(np.tile([1.0, 0, 0], (9, 1)), np.tile([0, 0, 1.0], (9, 1)))
-    (carried,), lost = same.carry([TaughtLine(places, turns)], 0.025)
+    (carried,), lost = carry(same, [TaughtLine(places, turns)], 0.025)
     assert lost == 0
     np.testing.assert_allclose(carried.positions, places, atol=0.01)
     assert (axes(carried)[2][:, 2] < -0.99).all()
@@ -110,15 +112,26 @@ def test_a_line_is_cut_where_the_target_has_no_surface(model):
     hole = (whole.normals[:, 1] > 0.5) & (np.abs(whole.points[:, 2]) < 0.12)
     way = Correspondence(taught_on(model, cloud(), 1.0), model.embed(whole.select(~hole)))
     taught = line_on_top(count=40)
-    carried, lost = way.carry([taught], 0.025)
+    carried, lost = carry(way, [taught], 0.025)
     assert len(carried) == 2 and [line.taught for line in carried] == [0, 0]
     assert lost == 40 - sum(len(line.positions) for line in carried) > 4
     kept = np.concatenate([line.waypoints for line in carried])
     assert np.abs(taught.positions[kept, 2]).min() > 0.06
 
 
+def test_a_line_is_cut_where_the_surface_is_torn(model):
+    """A panel carried to two slats: what would lie in the gap goes to their edges."""
+    slats = cloud(count=12_000, seed=1)
+    slats = slats.select(~((slats.normals[:, 1] > 0.5) & (np.abs(slats.points[:, 2]) < 0.03)))
+    way = Correspondence(taught_on(model, cloud(), 1.0), model.embed(slats))
+    carried, lost = carry(way, [line_on_top(count=60)], 0.025)
+    assert len(carried) == 2 and lost == 0
+    for line in carried:
+        assert np.linalg.norm(np.diff(line.positions, axis=0), axis=1).max() < 0.025
+
+
 def test_nothing_is_carried_from_nothing(way):
-    assert way.carry([], 0.025) == ((), 0)
+    assert carry(way, [], 0.025) == ((), 0)
 
 
 def test_a_direction_follows_the_surface(way):
@@ -129,3 +142,13 @@ def test_a_direction_follows_the_surface(way):
         assert np.linalg.norm(there) == pytest.approx(1.0)
     spot = faces(cloud())["top"][:1]
     np.testing.assert_allclose(way.direction(spot, 3 * UP), UP)
+
+
+def test_a_mirror_image_is_asked_too_and_brought_back(model):
+    """An untrained C puts a shape onto itself; so does its mirror image's."""
+    reference = TaughtSurface(model.set_reference(cloud()))
+    way = Correspondence(reference, model.embed(cloud(seed=1)))
+    points, normals = cloud().points[:50], cloud().normals[:50]
+    mapped = way._mapped(points, normals)
+    np.testing.assert_allclose(way.embedded.original(mapped.points), points, atol=0.01)
+    np.testing.assert_allclose(mapped.normals, normals, atol=0.05)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from nrdf import cli
-from nrdf.bundled import TARGETS, bundled_chair
+from nrdf.bundled import bundled_chair
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.ply import read_header, read_scalars
@@ -230,13 +230,14 @@ def test_unexpected_errors_keep_their_traceback(retrieve, tmp_path, monkeypatch)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path):
+def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path, monkeypatch):
+    monkeypatch.setattr("nrdf.bundled.TARGETS", ("rocker",))
     out = tmp_path / "demo"
     assert cli.run(["demo", "--model", str(untrained), "--out", str(out)]) == 0
     report = json.loads((out / "report.json").read_text())
     assert {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()} == set(report["files"])
     rows = report["found"]
-    assert len(rows) == 15
+    assert len(rows) == 5
     for row in rows:
         _, truth = bundled_chair(row["chair"])
         assert row["true"] == int(truth[row["region"]].sum())
@@ -248,11 +249,10 @@ def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path
         else:
             assert row["found"] == 0 or row["confidence"] < MIN_CONFIDENCE
     assert max(row["iou"] for row in rows) > 0.3
-    assert sum(row["coverage"] is not None for row in rows) >= 8
+    assert sum(row["coverage"] is not None for row in rows) >= 3
     assert (out / "picture.png").stat().st_size > 50_000
-    for chair in TARGETS:
-        assert (out / chair / "report.html").exists()
-        assert list((out / chair / "export" / "urscript").iterdir())
+    assert (out / "rocker" / "report.html").exists()
+    assert list((out / "rocker" / "export" / "urscript").iterdir())
     # What the demo suggests to try next works.
     result = tmp_path / "result"
     words = f"retrieve --model {untrained} --reference {out}/reference.ply --region "

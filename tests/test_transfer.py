@@ -192,3 +192,11 @@ def test_points_in_use_are_found_again(model):
     some = np.arange(0, 20_000, 3)
     found = working(embedded, some)
     np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
+
+
+def test_taught_spots_are_carried_one_by_one(model):
+    spots = [{"positions_m": [[0.25, 0.1, z]]} for z in (-0.2, 0.0, 0.2)]
+    taught = lesson({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
+    step = Teacher(taught, model).transfer(cloud(seed=1)).paths[0]
+    assert step.reason == "" and [len(s.positions) for s in process_segments(step)] == [1, 1, 1]
+    assert step.measures.cycle_time_s > 6.0

@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 from nrdf.benchmark.family import CLOUD_POINTS, FIRST_SEED
 from nrdf.cloud import PointCloud
 from nrdf.errors import DataError, ProcessError
-from nrdf.process.carry import Correspondence
+from nrdf.process.carry import carry
+from nrdf.process.correspondence import Correspondence
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.lesson import Lesson
 from nrdf.process.transfer import Teacher
@@ -66,7 +67,7 @@ class CarryResult:
 def evaluate_carry(
     model: Model,
     category: str,
-    pairs: int = 20,
+    pairs: int = 50,
     progress: Callable[[int, int], None] | None = None,
 ) -> CarryResult:
     """Carry rasters on every region between `pairs` pairs of unseen members.
@@ -154,7 +155,7 @@ def _carried(
         lines = teacher.lines(name, 0)
     except ProcessError:
         return None
-    carried, _ = way.carry(lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
+    carried, _ = carry(way, lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
     errors, counts = [], np.zeros(4)
     arrived = [np.full((len(line.positions), 3), np.nan) for line in lines]
     for line in carried:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score on scans (bsrc), exact truth (families, carry, toolpaths), shapes themselves (shape).
+    """Score: on scans (bsrc), exact truth (families, carry), shapes (shape), planning (toolpaths).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """

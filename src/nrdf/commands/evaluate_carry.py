@@ -10,7 +10,7 @@ from nrdf.commands.console import console, progress_bar, show, table
 def carry(
     category: Literal["chair", "car", "plane", "table"],
     model: str | None = None,
-    pairs: int = 20,
+    pairs: int = 50,
     device: str = "cpu",
 ) -> None:
     """Carried waypoints against the exact truth of the parametric families.

@@ -165,7 +165,7 @@ def _compare(chair: str, transferred: Transferred, truth: dict[str, np.ndarray])
             Found(
                 chair=chair,
                 region=step.region,
-                process=step.process.label,
+                process=step.process.kind,
                 found=len(match.indices),
                 true=int(truth[step.region].sum()),
                 iou=round(overlap(match.indices, truth[step.region]), 4),

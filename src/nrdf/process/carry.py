@@ -1,44 +1,22 @@
-"""Taught waypoints carried through the correspondence, and directions.
+"""Taught waypoints carried to another object.
 
-Each waypoint's foot on the reference's surface is mapped by C, brought onto the target's smooth
-surface, and the tool keeps its place and angles relative to the local frame of travel and normal.
+Each waypoint's foot on the reference's surface goes through the correspondence, and the tool keeps
+its place and angles relative to the local frame of travel and normal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from nrdf.geometry import thin
+from nrdf.process.correspondence import Correspondence, lengths
 from nrdf.process.frames import surface_frames, travel_of
-from nrdf.process.surface import Surface, unit
 from nrdf.process.taught import TaughtLine, feet_under
-from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
-from nrdf.regions.embedded import Embedded
-from nrdf.regions.model import Taught
-from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
-FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
-"""A waypoint has a counterpart where C's place is at most so far off the target's points, in all
-and sideways (beyond an edge, or in a hole), as shares of the longest side, not counting the
-distance between points; and where C trusts it."""
-_KEPT = 1.2  # spacings of points that a place may lie beside one; what is more lies off the edge
-_ANCHORS = 1200  # points of the reference whose places are settled
-_BLENDED, _BLEND = 8, 0.005  # anchors that a place follows, and the distance that softens it
-_SETTLING = RegistrationSettings(
-    iterations=8,
-    radius_start=0.3,
-    radius_end=0.15,
-    normal_weight_start=0.15,
-    normal_weight_end=0.1,
-    match_scale=0.06,
-)
-"""Chosen on unseen family pairs (`nrdf eval carry`)."""
+_TORN, _GAP = 1.5, 1.2  # times its length on the reference, and spacings, that a step may have
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
 
 
@@ -52,152 +30,46 @@ class CarriedLine(TaughtLine):
     waypoints: np.ndarray
 
 
-class TaughtSurface:
-    """A reference as waypoints are carried from it: as the field sees it, and as a surface."""
+def carry(
+    way: Correspondence, lines: Sequence[TaughtLine], tool_radius_m: float
+) -> tuple[tuple[CarriedLine, ...], int]:
+    """Lines on the reference as lines on the target, and how many waypoints have no place.
 
-    def __init__(self, taught: Taught) -> None:
-        self.taught = taught
-        self.surface = surface_of(taught.reference)
-
-    @cached_property
-    def anchors(self) -> np.ndarray:
-        """Even points (a,) of the working cloud whose places on a target are settled."""
-        return thin(self.taught.reference.points, _ANCHORS, np.random.default_rng(0))
-
-    @cached_property
-    def template(self) -> RegistrationTemplate:
-        """The anchors, ready to be moved."""
-        reference, at = self.taught.reference, self.anchors
-        return RegistrationTemplate(reference.points[at], reference.normals[at], _SETTLING)
-
-    @cached_property
-    def tree(self) -> cKDTree:
-        """The anchors in position and normal."""
-        reference, at = self.taught.reference, self.anchors
-        return cKDTree(
-            oriented_features(reference.points[at], reference.normals[at], NORMAL_WEIGHT)
-        )
-
-
-class Correspondence:
-    """The way from a reference's surface to a target's, both in metres.
-
-    C's places are settled: a smooth, small displacement, the same as in registration, brings the
-    whole mapped reference and the target closer, both ways, so that edges come to lie on edges.
+    A line is cut where waypoints have no counterpart, and where the surface is torn between
+    two of them, so that no tool is driven across a gap. The tool's height over the surface, and
+    its angles to travel and normal, stay; a flat tool of `tool_radius_m` feels the normals.
     """
-
-    def __init__(self, reference: TaughtSurface, embedded: Embedded) -> None:
-        self.reference, self.embedded = reference, embedded
-        self.target = surface_of(embedded)
-        features = oriented_features(embedded.points, embedded.normals, NORMAL_WEIGHT)
-        self._tree = cKDTree(features)
-
-    @cached_property
-    def _settled(self) -> np.ndarray:
-        """Displacement (a, 3) of each anchor's place, canonical."""
-        reference, embedded = self.reference, self.embedded
-        mapped = reference.taught.map_surface(embedded)
-        start = mapped.points[reference.anchors]
-        facing = unit(mapped.normals[reference.anchors])
-        at = thin(embedded.points, 2 * _ANCHORS, np.random.default_rng(1))
-        moved = reference.template.register(
-            embedded.points[at], embedded.normals[at], (start, facing)
-        )
-        return np.asarray(moved.points - start)
-
-    def places(
-        self, points: np.ndarray, normals: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where places (m, 3) of the reference's surface, with normals (m, 3), are on the target.
-
-        Returns places on its smooth surface (m, 3), normals there (m, 3), and whether the place
-        exists (m,): the field trusts it, and it lies near the surface.
-        """
-        embedded, whole = self.embedded, self.reference.taught.reference
-        mapped = self.reference.taught.map_places(points, normals, embedded)
-        asked = oriented_features(
-            whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
-        )
-        distance, near = self.reference.tree.query(asked, _BLENDED)
-        weight = 1.0 / (distance + _BLEND) ** 2
-        weight /= weight.sum(axis=1, keepdims=True)
-        arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._settled[near])
-        facing = unit(mapped.normals)
-        nearest = self._tree.query(oriented_features(arrived, facing, NORMAL_WEIGHT))[1]
-        start, outward = embedded.points[nearest], embedded.normals[nearest]
-        offset = arrived - start
-        sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
-        length = np.linalg.norm(sideways, axis=1, keepdims=True)
-        spacing = self.target.spacing / embedded.pose.scale
-        kept = start + sideways * np.minimum(1.0, _KEPT * spacing / np.maximum(length, 1e-12))
-        found, found_normals = self.target.project(
-            embedded.original(kept), embedded.original_normals(outward)
-        )
-        exists = np.linalg.norm(offset, axis=1) <= FARTHEST + spacing
-        exists &= length[:, 0] <= BEYOND + spacing
-        return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
-
-    def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """A direction (3,) at a region of the reference, unit length, as it is on the target.
-
-        region: (k,) indices into the reference's cloud. The smooth map between the two regions is
-        taken as affine; across the surface, where points do not tell, as a turn and a scale.
-        """
-        taught = self.reference.taught
-        here = taught.reference.cloud.points[region]
-        there = self.embedded.original(taught.map_points(region, self.embedded).points)
-        here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
-        spread = here.T @ here
-        size = float(np.trace(spread))
-        if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
-            canonical = taught.reference.canonical_normals(np.asarray(direction, float))
-            return unit(self.embedded.original_normals(canonical))
-        turn, _ = Rotation.align_vectors(there, here)
-        similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
-        ridge = 0.05 * size / 3.0 * np.eye(3)
-        affine = np.linalg.solve(spread + ridge, here.T @ there + ridge @ similar.T).T
-        return unit(affine @ unit(np.asarray(direction, float)))
-
-    def carry(
-        self, lines: Sequence[TaughtLine], tool_radius_m: float
-    ) -> tuple[tuple[CarriedLine, ...], int]:
-        """Lines on the reference as lines on the target, and how many waypoints have no place.
-
-        A line is cut where waypoints have no counterpart. The tool's height over the surface, and
-        its angles to travel and normal, stay; a flat tool of `tool_radius_m` feels the normals.
-        """
-        if not lines:
-            return (), 0
-        source = self.reference.surface
-        positions = np.concatenate([line.positions for line in lines])
-        quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
-        owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
-        turns = Rotation.from_quat(quaternions).as_matrix()
-        feet, normals = feet_under(source, positions, -turns[:, :, 2])
-        felt = source.smooth_normals(feet, normals, tool_radius_m)
-        found, found_normals, exists = self.places(feet, normals)
-        found_felt = self.target.smooth_normals(found, found_normals, tool_radius_m)
-        # Where there is no line to tell the travel, a short way along tool x is mapped.
-        ahead, ahead_normals = source.project(feet + 2 * source.spacing * turns[:, :, 0], normals)
-        step = self.places(ahead, ahead_normals)[0] - found
-        carried, lost = [], int((~exists).sum())
-        for number in range(len(lines)):
-            mine = np.flatnonzero(owner == number)
-            for run in _runs(exists[mine]):
-                at = mine[run]
-                frames = _frames(feet[at], felt[at], turns[at, :, 0], source.spacing)
-                there = _frames(found[at], found_felt[at], step[at], self.target.spacing)
-                change = there @ frames.transpose(0, 2, 1)
-                offset = np.einsum("mab,mb->ma", change, positions[at] - feet[at])
-                turned = Rotation.from_matrix(change @ turns[at]).as_quat()
-                line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
-                carried.append(line)
-        return tuple(carried), lost
-
-
-def surface_of(embedded: Embedded) -> Surface:
-    """The surface of a cloud in metres, of the points that the field works on."""
-    return Surface(embedded.original(embedded.points), embedded.original_normals(embedded.normals))
+    if not lines:
+        return (), 0
+    source = way.reference.surface
+    positions = np.concatenate([line.positions for line in lines])
+    quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
+    owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
+    turns = Rotation.from_quat(quaternions).as_matrix()
+    feet, normals = feet_under(source, positions, -turns[:, :, 2])
+    felt = source.smooth_normals(feet, normals, tool_radius_m)
+    found, found_normals, exists = way.places(feet, normals)
+    found_felt = way.target.smooth_normals(found, found_normals, tool_radius_m)
+    # Where there is no line to tell the travel, a short way along tool x is mapped.
+    ahead, ahead_normals = source.project(feet + 2 * source.spacing * turns[:, :, 0], normals)
+    step = way.places(ahead, ahead_normals)[0] - found
+    grown = way.embedded.pose.scale / way.reference.taught.reference.pose.scale
+    carried, lost = [], int((~exists).sum())
+    for number in range(len(lines)):
+        mine = np.flatnonzero(owner == number)
+        step_there = lengths(np.diff(found[mine], axis=0))
+        step_here = lengths(np.diff(feet[mine], axis=0))
+        torn = step_there > _TORN * grown * step_here + _GAP * way.target.spacing
+        for run in _runs(exists[mine], torn):
+            at = mine[run]
+            frames = _frames(feet[at], felt[at], turns[at, :, 0], source.spacing)
+            there = _frames(found[at], found_felt[at], step[at], way.target.spacing)
+            change = there @ frames.transpose(0, 2, 1)
+            offset = np.einsum("mab,mb->ma", change, positions[at] - feet[at])
+            turned = Rotation.from_matrix(change @ turns[at]).as_quat()
+            line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
+            carried.append(line)
+    return tuple(carried), lost
 
 
 def _frames(
@@ -210,9 +82,11 @@ def _frames(
     return surface_frames(travel, normals)
 
 
-def _runs(good: np.ndarray) -> list[np.ndarray]:
-    """Indices of each unbroken stretch of True."""
+def _runs(good: np.ndarray, torn: np.ndarray) -> list[np.ndarray]:
+    """Indices of each stretch of True in `good` (n,) that `torn` (n - 1,) between two does not
+    break."""
     places = np.flatnonzero(good)
     if not len(places):
         return []
-    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    broken = (np.diff(places) > 1) | torn[places[:-1]]
+    return np.split(places, np.flatnonzero(broken) + 1)

@@ -10,6 +10,8 @@ from nrdf.process.grid import Grid
 from nrdf.process.patch import Patch
 from nrdf.process.raster import Stroke, strip_middles
 
+_ROUND = 0.4  # of the stepover: how far corners are rounded
+
 
 def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
     """Closed rings at even distances from a patch's border, from the outside in.
@@ -42,7 +44,8 @@ def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke
         slope = np.stack(np.gradient(depth, grid.pitch)[::-1], axis=-1)
         strokes, end = [], rings[0][0][0]
         for chain in _chains(rings, stepover_m):
-            strokes.append(_wound(chain, grid, depth, slope, end))
+            # Turns that cannot sink any further on a ridge are straightened out.
+            strokes.append(_smooth(_wound(chain, grid, depth, slope, end), _ROUND * stepover_m))
             end = strokes[-1][-1]
         parts.append(strokes)
     return parts
@@ -62,7 +65,10 @@ def _rings(
         depth = ndimage.gaussian_filter(np.where(near, clear, -grid.pitch), 1.0)
         levels = strip_middles(float(depth.max()), stepover)
         rings = [
-            [_smooth(_anticlockwise(ring), 0.4 * stepover) for ring in grid.contours(depth, level)]
+            [
+                _smooth(_anticlockwise(ring), _ROUND * stepover)
+                for ring in grid.contours(depth, level)
+            ]
             for level in levels
         ]
         rings = [level for level in rings if level]
@@ -77,13 +83,18 @@ def _anticlockwise(ring: Stroke) -> Stroke:
     return ring if area > 0.0 else ring[::-1]
 
 
-def _smooth(ring: Stroke, reach: float) -> Stroke:
-    """A closed ring with its corners, and what the ragged border has left in it, rounded."""
-    step = np.linalg.norm(np.diff(ring, axis=0), axis=1).mean()
+def _smooth(line: Stroke, reach: float) -> Stroke:
+    """A line with its corners, and what the ragged border has left in it, rounded; even steps."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    count = max(int(np.ceil(length[-1] / (0.25 * reach))), 8)
+    at = np.linspace(0.0, length[-1], count + 1)
+    even = np.stack([np.interp(at, length, line[:, k]) for k in (0, 1)], axis=1)
     # Short rings would shrink to nothing.
-    sigma = min(reach / step, 0.05 * len(ring))
-    round_ = ndimage.gaussian_filter1d(ring[:-1], sigma, axis=0, mode="wrap")
-    return np.concatenate([round_, round_[:1]])
+    sigma = min(reach * count / length[-1], 0.05 * count)
+    if np.array_equal(line[0], line[-1]):
+        rounded = ndimage.gaussian_filter1d(even[:-1], sigma, axis=0, mode="wrap")
+        return np.concatenate([rounded, rounded[:1]])
+    return ndimage.gaussian_filter1d(even, sigma, axis=0, mode="nearest")
 
 
 def _started_near(ring: Stroke, place: np.ndarray) -> Stroke:
@@ -139,8 +150,13 @@ def _wound(
             # Where the depth has a ridge there is no way down on the other side.
             length = np.linalg.norm(move, axis=1, keepdims=True)
             turn = ring + move * np.minimum(1.0, farthest / np.maximum(length, 1e-12))
+        # On either side of a ridge the way down differs: the turn goes over it smoothly.
+        turn = ring + ndimage.gaussian_filter1d(turn - ring, 3.0, axis=0, mode="nearest")
         pieces.append(turn[1:])
-        ring = _started_near(inner, turn[-1])
+        # A little ahead, so that the way never turns back.
+        ahead = turn[-1] - turn[-4]
+        step = 0.5 * abs(there - here) / max(float(np.linalg.norm(ahead)), 1e-12)
+        ring = _started_near(inner, turn[-1] + step * ahead)
     if len(chain) > 1:
         pieces.append(ring)
     return np.concatenate(pieces)

@@ -101,17 +101,8 @@ def _fit(
     held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
     lean = lean_rotation(strategy.lead_rad, strategy.tilt_rad)
     tails = -(held * lean.inv()).as_matrix()[:, :, 2]
-    # At an edge there are several sheets, each found from a normal of its own; the nearest counts.
-    near = surface.normals[surface.tree.query(everywhere, min(8, len(surface.points)))[1]]
-    facing = np.einsum("nka,na->nk", near, tails) > _FACING
-    beneath = near[np.arange(len(near)), facing.argmax(axis=1)]
-    off = np.min(
-        [
-            np.linalg.norm(surface.project(everywhere, normals)[0] - everywhere, axis=1)
-            for normals in (tails, beneath)
-        ],
-        axis=0,
-    )
+    _, _, off = surface.nearest(everywhere, tails)
+    off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
     smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
     asked = []
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
@@ -223,14 +214,15 @@ def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> n
         other = np.abs(walked[i] - walked[j]) > np.minimum(3.0 * away, 2.5 * stepover)
         kept = other & (np.abs(beside) > 0.5 * away) & (away > 1e-9)
         i, j, key = i[kept], j[kept], (2 * i + (beside > 0.0))[kept]
-        order = np.lexsort((away[kept], key))
+        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
+        order = np.lexsort((chord, key))
         _, first = np.unique(key[order], return_index=True)
-        i, j = i[order][first], j[order][first]
-        whole = ~end[j]  # what goes on past a line's end is not beside it
+        i, j, chord = (values[order][first] for values in (i, j, chord))
+        # What goes on past a line's end is not beside it, and what is far off no neighbour.
+        whole = ~end[j] & (chord < 2.5 * stepover)
         for share in (0.25, 0.5, 0.75):
             whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
-        i, j = i[whole], j[whole]
-        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
+        i, j, chord = i[whole], j[whole], chord[whole]
         turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
         half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
         found.append(chord / np.sinc(half / np.pi))  # the arc over the chord

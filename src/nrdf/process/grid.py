@@ -46,11 +46,16 @@ class Grid:
         return ndimage.gaussian_filter(count / self.pitch**2, sigma / self.pitch, mode="constant")
 
     def smooth(self, uv: np.ndarray, values: np.ndarray, sigma: float) -> np.ndarray:
-        """`values` (n,) at `uv` (n, 2) as a smooth field, carried on beyond the points."""
+        """`values` (n, k) at `uv` (n, 2) as smooth fields (k, rows, columns), carried on beyond."""
         near, far = self.density(uv, sigma), self.density(uv, 5.0 * sigma)
-        sum_near, sum_far = (self.density(uv, s, values) for s in (sigma, 5.0 * sigma))
         ground = 1e-6 * far.max()
-        return (sum_near + 1e-3 * sum_far + ground * values.mean()) / (near + 1e-3 * far + ground)
+        fields = [
+            self.density(uv, sigma, column)
+            + 1e-3 * self.density(uv, 5.0 * sigma, column)
+            + ground * column.mean()
+            for column in values.T
+        ]
+        return np.stack(fields) / (near + 1e-3 * far + ground)
 
     def sample(self, field: np.ndarray, uv: np.ndarray, order: int = 1) -> np.ndarray:
         """A field's values at `uv` (..., 2), linear between nodes, the nearest beyond the rim."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from nrdf.cloud import write_cloud
 from nrdf.output import REPORT, write_json
-from nrdf.picture import Panel, draw_regions
+from nrdf.picture import Panel, draw_regions, render_details
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.lesson import checksum, overlaps
@@ -24,6 +25,7 @@ from nrdf.regions.files import write_matches
 
 KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
 PAGE, PICTURE = "report.html", "picture.png"
+_WHOLE, _DETAIL = 540, 280  # pixels of a view; the page shows details smaller
 
 
 def write_transfer(
@@ -49,11 +51,15 @@ def write_transfer(
     if job.paths:
         write_job(folder, job)
         write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
+    start = time.perf_counter()
     panel = panel_of(transferred, title)
-    draw_regions([panel], folder / PICTURE, size=540)
+    draw_regions([panel], folder / PICTURE, _WHOLE)
+    details = render_details(panel, list(panel.regions), _DETAIL)
+    seconds = {**transferred.seconds, "pictures": time.perf_counter() - start}
     report = {"title": title, **report_of(transferred, limits), **origin}
+    report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    write_page(folder / PAGE, report, panel, folder / PICTURE)
+    write_page(folder / PAGE, report, folder / PICTURE, details)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     report["files"] = [*files, REPORT]
     write_json(folder / REPORT, report)

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.picture import Panel, region_colours, render_details
+from nrdf.picture import region_colours
 from nrdf.ply import write_atomically
 from nrdf.process.report import FIGURES, figures
 from nrdf.units import in_words
 
-_DETAIL = 280  # pixels, shown smaller
 _STYLE = """
 :root { --ink: #1f2328; --soft: #656d76; --line: #d8dee4; --bad: #b42318; --good: #1a7f37; }
 * { box-sizing: border-box; }
@@ -54,11 +53,12 @@ code { font-size: 12.5px; word-break: break-word; }
 _COLUMNS = ("region", "process", "confidence", *FIGURES)
 
 
-def write_page(path: Path, report: Mapping[str, Any], panel: Panel, picture: Path) -> None:
-    """Write the page of a transfer's report. panel: the target with regions and tool paths, drawn
-    close for each region; picture: of the whole. Raises OutputError if it cannot be written."""
-    shown = [name for name in panel.regions if len(panel.regions[name])]
-    details = {n: _png(image) for n, image in render_details(panel, shown, _DETAIL).items()}
+def write_page(
+    path: Path, report: Mapping[str, Any], picture: Path, details: Mapping[str, np.ndarray]
+) -> None:
+    """Write the page of a transfer's report. picture: of the whole target; details: a close one
+    (h, w, 3) in [0, 1] for each region. Raises OutputError if it cannot be written."""
+    close = {name: _png(image) for name, image in details.items()}
     colours = {
         name: "#" + "".join(f"{round(255 * c):02x}" for c in colour)
         for name, colour in region_colours(list(report["regions"])).items()
@@ -67,9 +67,9 @@ def write_page(path: Path, report: Mapping[str, Any], panel: Panel, picture: Pat
     parts = [
         _head(report),
         _cards(report) + _notes(report),
-        f'<img class="whole" alt="{escape(panel.title)}" src="data:image/png;base64,{whole}">',
+        f'<img class="whole" alt="{escape(report["title"])}" src="data:image/png;base64,{whole}">',
         f"<h2>Tool paths, in the order they are driven</h2>{_table(report, colours)}",
-        f'<h2>Each of them</h2><div class="paths">{_details(report, details, colours)}</div>',
+        f'<h2>Each of them</h2><div class="paths">{_details(report, close, colours)}</div>',
         _foot(report),
     ]
     title = escape(f"{report['category']}: {report['title']}")

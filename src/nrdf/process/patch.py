@@ -64,9 +64,12 @@ class Patch:
         """
         distance, near = self._tree.query(uv, min(_FITTED, len(self.uv)))
         weight = (1.0 - (distance / (1.05 * distance[:, -1:] + 1e-12)) ** 2) ** 2
-        offset = (self.uv[near] - uv[:, None]) / self.spacing
-        origin = self.points[near[:, 0]]
-        found = quadrics(offset, self.points[near] - origin[:, None], weight)
+        origin, middle = self.points[near[:, 0]], self.uv[near[:, 0]]
+        offset = self.points[near] - origin[:, None]
+        # Points that are nearer in the plane than in space lie beyond a gap or round an edge.
+        flat = np.linalg.norm(self.uv[near] - middle[:, None], axis=2)
+        weight *= np.linalg.norm(offset, axis=2) < 1.3 * flat + 0.5 * self.spacing
+        found = quadrics((self.uv[near] - uv[:, None]) / self.spacing, offset, weight)
         return origin + found[:, 0], found[:, 1:3] / self.spacing
 
     def smooth_normals(self, uv: np.ndarray, radius_m: float) -> np.ndarray:
@@ -107,7 +110,7 @@ class Patch:
         """
         grid = self.border.grid
         area = grid.nodes[self.border.clearance(grid.nodes, 0.0) > 0.0]
-        area = area if len(area) else self.uv[self.label == OWN]
+        area = area if len(area) > 2 else self.uv[self.label == OWN]
         squared, axes = np.linalg.eigh(np.cov(area.T))
         angles = np.radians(np.arange(90.0))
         if squared[1] > _LONG * squared[0]:
@@ -140,12 +143,13 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
         own, depth = waiting.pop()
         if len(own) < _FEWEST:
             continue
-        # No context where it closes a tube or goes round an edge.
-        for hops in (1 if depth else 2, 0):
+        # No surroundings where they close a tube or go round an edge.
+        for hops, most in ((1 if depth else 2, 0.5 * _BENT), (0, _BENT)):
             around = _surroundings(surface, own, hops)
             edges = _edges_within(surface, around)
             flat = unroll(surface.points[around], surface.normals[around], edges, surface.spacing)
-            bent = flat.error[np.isin(around, own)] > _BENT
+            mine = np.isin(around, own)
+            bent = (flat.error[mine] > most) | _folded(surface.points[around], flat.uv)[mine]
             if bent.mean() <= _BENT_SHARE:
                 break
         if depth < _DEEPEST and bent.mean() > _BENT_SHARE:
@@ -169,6 +173,13 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
         _patch(surface, around, flat, _labels(owner[around], k, len(found)))
         for k, (_, around, flat) in enumerate(found)
     )
+
+
+def _folded(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Whether (n,) points (n, 3) lie over others in the plane uv (n, 2) that are elsewhere."""
+    away, near = cKDTree(uv).query(uv, min(4, len(uv)))
+    apart = np.linalg.norm(points[near] - points[:, None], axis=2)
+    return (apart > 3.0 * away + 1e-9).any(axis=1)
 
 
 def _labels(owner: np.ndarray, patch: int, nobody: int) -> np.ndarray:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.contour import contour, spiral
-from nrdf.process.frames import steady, surface_frames, tool_quaternions, travel_of
+from nrdf.process.frames import lean_rotation, steady, surface_frames, travel_of
 from nrdf.process.patch import Patch, patches_of
 from nrdf.process.raster import Stroke, raster
 from nrdf.process.surface import Surface, unit
@@ -24,6 +24,7 @@ Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
 
 
 @dataclass(frozen=True)
@@ -100,12 +101,9 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
     blocks: list[list[Line]] = []
-    for strokes_of in _sweeps(patches, strategy):
-        sweep: list[list[Line]] = []
-        for patch, parts in strokes_of:
-            found = iter(_lines(surface, patch, [s for part in parts for s in part], strategy))
-            sweep += [[next(found) for _ in part] for part in parts]
-        blocks += _nearest_first(sweep)
+    for sweep in _sweeps(patches, strategy):
+        found = [block for patch, parts in sweep for block in _on(surface, patch, parts, strategy)]
+        blocks += _nearest_first(found)
     if not blocks:
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
@@ -147,13 +145,13 @@ def _held(
     contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Positions and quaternions of a tool along lines on the surface."""
-    held = []
-    for line, outward in zip(contacts, normals, strict=True):
-        travel = travel_of(line, 0.5 * strategy.stepover_m)
-        turns = tool_quaternions(travel, outward, strategy.lead_rad, strategy.tilt_rad)
-        axis = Rotation.from_quat(turns).as_matrix()[:, :, 2]
-        held.append((line - strategy.standoff_m * axis, turns))
-    return held
+    travel = np.concatenate([travel_of(line, 0.5 * strategy.stepover_m) for line in contacts])
+    upright = surface_frames(travel, np.concatenate(normals))
+    turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    quaternions = [steady(part) for part in np.split(turned.as_quat(), cuts)]
+    return list(zip(np.split(places, cuts), quaternions, strict=True))
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
@@ -202,30 +200,46 @@ def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[floa
     ]
 
 
-def _lines(
-    surface: Surface, patch: Patch, strokes: Sequence[Stroke], strategy: Strategy
-) -> list[Line]:
-    """Strokes brought onto the surface, their waypoints evenly spaced."""
+def _on(
+    surface: Surface, patch: Patch, parts: Sequence[Sequence[Stroke]], strategy: Strategy
+) -> list[list[Line]]:
+    """Strokes brought onto the surface, their waypoints evenly spaced: a block of lines a part."""
+    strokes = [stroke for part in parts for stroke in part]
     if not strokes:
         return []
     cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
     even = []
     flat = patch.at(np.concatenate(strokes))[0]
     for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
-        steps = np.linalg.norm(np.diff(way, axis=0), axis=1)
+        plane = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
+        steps = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1), _JUMP * plane)
         walked = np.concatenate([[0.0], np.cumsum(steps)])
         count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
         at = np.linspace(0.0, walked[-1], count + 1)
         even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
     places = np.concatenate(even)
     flat, along = patch.at(places)
-    contacts, _ = surface.project(flat, unit(np.cross(along[:, 0], along[:, 1])))
-    normals = patch.smooth_normals(places, strategy.tool_radius_m)
+    outward = unit(np.cross(along[:, 0], along[:, 1]))
+    contacts, normals, off = surface.nearest(flat, outward, 0.25)
     normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
-    cuts = np.cumsum([len(stroke) for stroke in even])[:-1]
-    return [
-        Line(*line) for line in zip(np.split(contacts, cuts), np.split(normals, cuts), strict=True)
-    ]
+    # Where thin parts are hardly sampled, there may be no surface under a place.
+    there = off < patch.spacing
+    farthest = 2.0 * strategy.spacing_m + 0.5 * patch.spacing
+    jump = np.linalg.norm(np.diff(contacts, axis=0), axis=1) > farthest
+    blocks, first = [], 0
+    ends = iter(np.cumsum([len(line) for line in even]))
+    for part in parts:
+        block = []
+        for _ in part:
+            last = int(next(ends))
+            found = first + np.flatnonzero(there[first:last])
+            cuts = (np.diff(found) > 1) | jump[found[:-1]]
+            runs = np.split(found, np.flatnonzero(cuts) + 1)
+            block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
+            first = last
+        if block:
+            blocks.append(block)
+    return blocks
 
 
 def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:

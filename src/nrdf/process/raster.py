@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import ndimage
 
@@ -22,24 +24,29 @@ def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> li
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     uv = patch.uv @ turn.T
     grid = Grid.around(uv, 0.5 * patch.spacing, 2.0 * patch.spacing)
-    nodes = grid.nodes
-    clear = patch.border.clearance(nodes @ turn, margin_m)
-    if not (clear > 0.0).any():
+
+    def clearance(places: np.ndarray) -> np.ndarray:
+        return patch.border.clearance(places @ turn, margin_m)
+
+    free = clearance(grid.nodes) > 0.0
+    rows = np.flatnonzero(free.any(axis=1))
+    if not len(rows):
         return []
     metric = turn @ patch.metric @ turn.T
-    uu, uv_, vv = (
-        grid.smooth(uv, metric[:, i, j], 1.5 * patch.spacing) for i, j in ((0, 0), (0, 1), (1, 1))
-    )
-    rows = np.flatnonzero((clear > 0.0).any(axis=1))
-    across = distance_from_row(uu, uv_, vv, grid.pitch, int(rows.mean()))
-    parts, count = ndimage.label(clear > 0.0, np.ones((3, 3)))
-    strokes = []
-    for part in range(1, count + 1):
-        inside = parts == part
-        found = _part(grid, across, inside, clear, patch, turn, stepover_m, margin_m)
-        if found:
-            strokes.append([stroke @ turn for stroke in found])
-    return strokes
+    components = np.stack([metric[:, 0, 0], metric[:, 0, 1], metric[:, 1, 1]], axis=1)
+    uu, mixed, vv = grid.smooth(uv, components, 1.5 * patch.spacing)
+    across = distance_from_row(uu, mixed, vv, grid.pitch, int(rows.mean()))
+    parts, count = ndimage.label(free, np.ones((3, 3)))
+    blocks = [_part(grid, across, parts == k, clearance, stepover_m) for k in range(1, count + 1)]
+    # Shorter than what the border is known to, a line is worth no approach of its own.
+    return [[stroke @ turn for stroke in _long(block, patch.spacing)] for block in blocks if block]
+
+
+def _long(strokes: list[Stroke], least: float) -> list[Stroke]:
+    """Strokes no shorter than `least`; the longest, if there are none."""
+    length = [float(np.linalg.norm(np.diff(s, axis=0), axis=1).sum()) for s in strokes]
+    least = min(least, max(length))
+    return [stroke for stroke, way in zip(strokes, length, strict=True) if way >= least]
 
 
 def strip_middles(width: float, stepover: float) -> np.ndarray:
@@ -77,12 +84,10 @@ def _part(
     grid: Grid,
     across: np.ndarray,
     inside: np.ndarray,
-    clear: np.ndarray,
-    patch: Patch,
-    turn: np.ndarray,
+    clearance: Callable[[np.ndarray], np.ndarray],
     stepover: float,
-    margin: float,
 ) -> list[Stroke]:
+    """Strokes of the part of a grid that is `inside`; across: distance square to the lines."""
     low, high = across[inside].min(), across[inside].max()
     levels = low + strip_middles(high - low, stepover)
     near = ndimage.binary_dilation(inside, np.ones((3, 3)))
@@ -91,8 +96,8 @@ def _part(
     v_nodes = grid.origin[1] + grid.pitch * np.arange(grid.shape[0])
     v = np.stack([np.interp(levels, across[:, k], v_nodes) for k in columns], axis=1)
     lines = np.stack([np.broadcast_to(u, v.shape), v], axis=-1)
-    free = patch.border.clearance(lines @ turn, margin)
-    free = np.where(grid.sample(near.astype(float), lines) > 0.0, free, -grid.pitch)
+    near_line = grid.sample(near.astype(float), lines) > 0.0
+    free = np.where(near_line, clearance(lines), -grid.pitch)
     strokes: list[Stroke] = []
     for number in range(len(levels)):
         row = _stretches(lines[number], free[number])

@@ -55,7 +55,6 @@ def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
             "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
             "not_met": limits.broken(transferred),
         },
-        "seconds": {name: round(value, 4) for name, value in transferred.seconds.items()},
     }
 
 

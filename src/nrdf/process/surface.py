@@ -20,7 +20,9 @@ SAME_SIDE = 0.5
 """Least cosine between the normals of points that may belong to one sheet."""
 _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
-_FITTED = 20
+_FITTED, _LEAST = 20, 4
+_SHEETS = 6  # normals to start from
+_ROUNDS, _SETTLED = 12, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
@@ -112,27 +114,77 @@ class Surface:
         Moving least squares: a quadric over the tangent plane, fitted to the nearest points of the
         side (Alexa et al., 2003). A point with no surface of its side around stays where it is.
         """
+        return self._settled(points, normals)[:2]
+
+    def nearest(
+        self, points: np.ndarray, normals: np.ndarray, near_enough: float = 0.02
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The nearest places on the smooth surface that faces normals (m, 3), and how far they are.
+
+        Returns places (m, 3), the surface's normals there (m, 3), distances (m,), m. As `project`,
+        but at an edge there are several sheets, each found from a normal of its own, of which the
+        nearest counts; a first one at less than `near_enough` spacings is taken at once. Where
+        there is no surface around, the distance is infinite.
+        """
+        points, normals = np.asarray(points, dtype=np.float64), unit(normals)
+        places, outward = points.copy(), normals.copy()
+        best = np.full(len(points), np.inf)
+        near = self._nearest_to(points, _SHEETS)
+        for start in (normals, *np.moveaxis(self.normals[near], 1, 0)):
+            facing = np.einsum("ma,ma->m", start, normals) > 0.2
+            asked = np.flatnonzero(facing & (best > near_enough * self.spacing))
+            found, turned, fitted = self._settled(points[asked], start[asked])
+            off = np.where(fitted, np.linalg.norm(found - points[asked], axis=1), np.inf)
+            closer = off < best[asked]
+            which = asked[closer]
+            places[which], outward[which] = found[closer], turned[closer]
+            best[which] = off[closer]
+        return places, outward, best
+
+    def _settled(
+        self, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places and normals as of `project`, and whether (m,) there is a surface around."""
         points, normals = np.array(points, dtype=np.float64), unit(normals)
-        near = self._nearest_to(points, 2 * _FITTED)
-        for _ in range(2):
-            distance, facing = self._seen(points, normals, near)
-            good = facing > _LEVEL
-            good &= np.cumsum(good, axis=1) <= _FITTED
-            reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
-            weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * facing**2
-            enough = (weight > 0).sum(axis=1) >= 6
-            mean = np.einsum("mk,mka->ma", weight, self.normals[near])
-            normals = np.where(enough[:, None], unit(mean), normals)
-            frame = tangent_frames(normals)
-            offset = np.einsum("mkb,mab->mka", self.points[near] - points[:, None], frame)
-            scale = self.spacing
-            found = quadrics(offset[..., :2] / scale, offset[..., 2:], weight)
-            height, slope = found[:, 0, 0], found[:, 1:3, 0] / scale
-            height = np.clip(height, -scale, scale)  # beyond an edge, quadrics run away
-            points = points + np.where(enough, height, 0.0)[:, None] * normals
-            tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
-            normals = np.where(enough[:, None], unit(tilted), normals)
-        return points, normals
+        near = self._nearest_to(points, 3 * _FITTED)
+        fitted = np.zeros(len(points), bool)
+        moving = np.arange(len(points))
+        for _ in range(_ROUNDS):
+            places, outward, fitted[moving] = self._fit(
+                points[moving], normals[moving], near[moving]
+            )
+            moved = np.linalg.norm(places - points[moving], axis=1) > _SETTLED * self.spacing
+            moved |= np.linalg.norm(outward - normals[moving], axis=1) > _SETTLED
+            points[moving], normals[moving] = places, outward
+            moving = moving[moved]
+            if not len(moving):
+                break
+        fitted[moving] = False  # those that find no rest
+        return points, normals, fitted
+
+    def _fit(
+        self, points: np.ndarray, normals: np.ndarray, near: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One step of `_settled`; near: (m, k) indices of the cloud points around."""
+        distance, facing = self._seen(points, normals, near)
+        good = facing > _LEVEL
+        good &= np.cumsum(good, axis=1) <= _FITTED
+        reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
+        weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * (facing - _LEVEL)
+        fitted = (weight > 0).sum(axis=1) >= _LEAST
+        # A place that no point is near is beyond the surface's edge.
+        fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
+        enough = fitted[:, None]
+        mean = np.einsum("mk,mka->ma", weight, self.normals[near])
+        normals = np.where(enough, unit(mean), normals)
+        frame = tangent_frames(normals)
+        offset = np.einsum("mkb,mab->mka", self.points[near] - points[:, None], frame)
+        found = quadrics(offset[..., :2] / self.spacing, offset[..., 2:], weight)
+        # Beyond an edge, quadrics run away.
+        height = np.where(enough, np.clip(found[:, 0], -self.spacing, self.spacing), 0.0)
+        slope = np.where(enough, found[:, 1:3, 0] / self.spacing, 0.0)
+        tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
+        return points + height * normals, unit(tilted), fitted
 
     def smooth_normals(
         self, points: np.ndarray, normals: np.ndarray, radius_m: float
@@ -146,11 +198,18 @@ class Surface:
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
         points, normals = np.asarray(points, dtype=np.float64), unit(normals)
         near = self._nearest_to(points, count)
-        for _ in range(3):
-            distance, facing = self._seen(points, normals, near)
+        turning = np.arange(len(points))
+        for _ in range(_ROUNDS):
+            around = near[turning]
+            distance, facing = self._seen(points[turning], normals[turning], around)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
-            mean = np.einsum("mk,mka->ma", weight, self.normals[near])
-            normals = np.where(weight.any(axis=1)[:, None], unit(mean), normals)
+            mean = np.einsum("mk,mka->ma", weight, self.normals[around])
+            found = np.where(weight.any(axis=1)[:, None], unit(mean), normals[turning])
+            turned = np.linalg.norm(found - normals[turning], axis=1) > _SETTLED
+            normals[turning] = found
+            turning = turning[turned]
+            if not len(turning):
+                break
         return normals
 
     def _nearest_to(self, points: np.ndarray, count: int) -> np.ndarray:

@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from nrdf.cloud import PointCloud, in_metres
 from nrdf.errors import ModelError, ProcessError
 from nrdf.output import output_folder
-from nrdf.process.carry import Correspondence, TaughtSurface
+from nrdf.process.carry import carry
+from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Line, Process, Transfer
 from nrdf.process.lesson import Lesson, known_unit, overlaps
@@ -210,7 +211,7 @@ class Teacher:
         self, region: str, number: int, process: Process, way: Correspondence
     ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
         lines = self.lines(region, number)
-        carried, lost = way.carry(lines, process.tool.radius_m)
+        carried, lost = carry(way, lines, process.tool.radius_m)
         total = sum(len(line.positions) for line in lines)
         if not carried:
             raise ProcessError(f"none of the {total} waypoints has a place on the target")

@@ -72,12 +72,19 @@ def unroll(points: np.ndarray, normals: np.ndarray, edges: np.ndarray, spacing: 
     wanted = 0.5 * (turn[i] * flat - turn[j] * flat[back])
     bent = weight * (np.abs(z[j] - z[i] - wanted) / length) ** 2
     error = np.sqrt(np.bincount(i, bent, n) / np.maximum(degree, 1e-300))
+    # Along its own principal axes, the patch lies the same way however the object does.
+    z -= z.mean()
+    axis = np.sqrt((z * z).mean() + 1e-300)
+    axis /= np.abs(axis)
+    lean = ((z * np.conj(axis)).real ** 3).mean()
+    axis *= -1.0 if lean < 0.0 else 1.0
+    z, turn = z * np.conj(axis), turn * np.conj(axis)
     # u runs along frame direction conj(turn), v along i conj(turn).
     c, s = turn.real[:, None], -turn.imag[:, None]
     along_u = c * frames[:, 0] + s * frames[:, 1]
     along_v = -s * frames[:, 0] + c * frames[:, 1]
     uv = np.stack([z.real, z.imag], axis=1)
-    return Unrolled(uv - uv.mean(axis=0), np.stack([along_u, along_v], axis=1), error)
+    return Unrolled(uv, np.stack([along_u, along_v], axis=1), error)
 
 
 def _factor(matrix: sparse.spmatrix) -> splu:
