@@ -76,7 +76,7 @@ def test_stretching_changes_proportions_and_keeps_sides_and_order():
     line = torch.linspace(-0.5, 0.5, 101)[:, None].expand(3, 101, 3)
     steps = deform.points(line).diff(dim=1)
     assert (steps > 0).all(), "folded"
-    assert (steps.amax(1) > 1.5 * steps.amin(1)).all()
+    assert (steps.amax(1) > 1.5 * steps.amin(1)).any(1).all()
 
 
 def test_select_gives_the_maps_of_the_chosen_shapes():
