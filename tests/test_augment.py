@@ -7,7 +7,7 @@ import torch
 from nrdf.training.augment import draw_deformation, draw_sample
 from nrdf.training.config import AugmentConfig
 
-STRONG = AugmentConfig(scaling=0.2, warp=0.05, mirror=True)
+STRONG = AugmentConfig(scaling=0.2, warp=0.05, stretch=0.4, mirror=True)
 
 
 def sphere(count: int = 400) -> torch.Tensor:
@@ -65,6 +65,18 @@ def test_mirror_swaps_left_and_right():
     plain = draw(surface, mirror=(1.0, 1.0, 1.0)).points(surface)
     flipped = draw(surface, mirror=(-1.0, -1.0, -1.0)).points(surface)
     assert torch.allclose(plain * torch.tensor([1.0, 1.0, -1.0]), flipped, atol=1e-5)
+
+
+def test_stretching_changes_proportions_and_keeps_sides_and_order():
+    surface = sphere()
+    surface = torch.cat([surface, surface * torch.tensor([1.0, 1.0, -1.0])], dim=1)
+    deform = draw(surface, AugmentConfig(stretch=2.0), mirror=(1.0, 1.0, 1.0))
+    right, left = deform.points(surface).chunk(2, dim=1)
+    assert torch.allclose(right * torch.tensor([1.0, 1.0, -1.0]), left, atol=1e-5)
+    line = torch.linspace(-0.5, 0.5, 101)[:, None].expand(3, 101, 3)
+    steps = deform.points(line).diff(dim=1)
+    assert (steps > 0).all(), "folded"
+    assert (steps.amax(1) > 1.5 * steps.amin(1)).any(1).all()
 
 
 def test_select_gives_the_maps_of_the_chosen_shapes():

@@ -14,7 +14,7 @@ from torch import Tensor
 from nrdf.training.config import AugmentConfig
 
 WAVES = 3
-STEEPEST = 0.6
+STEEPEST = 0.8
 """Bound on the displacement's derivative; below 1 the map cannot fold."""
 
 
@@ -107,6 +107,16 @@ def draw_deformation(
     phase = 2 * torch.pi * torch.rand(b, WAVES, generator=generator, device=device)
     amplitude = config.warp * normal(b, WAVES, 3)
     steep = (amplitude.norm(dim=-1) * wave.norm(dim=-1)).sum(1)
+    if config.stretch > 0:
+        axes = torch.eye(3, device=device)
+        turns = 2 * torch.pi * (0.5 + torch.rand(b, 3, 1, generator=generator, device=device))
+        start = 2 * torch.pi * torch.rand(b, 3, generator=generator, device=device)
+        start[:, 2] = 0.0  # left and right stretch alike
+        slope = config.stretch * normal(b, 3, 1)
+        wave = torch.cat([wave, turns * axes], dim=1)
+        phase = torch.cat([phase, start], dim=1)
+        amplitude = torch.cat([amplitude, slope / turns * axes], dim=1)
+        steep = steep + slope.abs().amax(dim=(1, 2))  # each acts on an axis of its own
     amplitude = amplitude * (STEEPEST / steep.clamp_min(STEEPEST))[:, None, None]
     centre, size = torch.zeros(b, 3, device=device), torch.ones(b, device=device)
     return Deformation(scale, wave, phase, amplitude, centre, size).recanonicalised(surface)

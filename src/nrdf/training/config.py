@@ -20,6 +20,9 @@ class AugmentConfig(Strict):
     """Standard deviation of the logarithm of each axis's scale."""
     warp: float = Field(default=0.0, ge=0)
     """Standard deviation of each of the low-frequency waves' displacement (canonical lengths)."""
+    stretch: float = Field(default=0.0, ge=0)
+    """Standard deviation of the steepest stretch of parts along each axis: a longer nose, a higher
+    seat, so that places are told by the shape around them and not by where they are."""
     mirror: bool = False
     """Mirror left and right, both shapes of a pair alike."""
     density: float = Field(default=0.0, ge=0)

@@ -11,6 +11,9 @@ from nrdf.shapes.families.plane_styles import Style
 from nrdf.shapes.families.sections import Superellipse, linear, smooth
 from nrdf.shapes.families.vehicle import blob, dish
 
+_NOSE = {"jet": 0.6, "pod": 0.45}
+"""Share of the front cone that is called nose; of others, nearly all of it."""
+
 
 class Aircraft:
     """One aircraft; `parts` are ready once it is made."""
@@ -26,7 +29,7 @@ class Aircraft:
         self._extras()
         self._gear()
         wing_x = 1 - style.edge
-        front = 1 - (0.35 if self.fuselage_is("jet") else 0.45) * style.nose
+        front = max(1 - _NOSE.get(style.fuselage, 0.85) * style.nose, wing_x + 0.06)
         if style.engines == "nose" or style.fuselage == "warbird":
             front, back = 0.84, 0.7
         else:

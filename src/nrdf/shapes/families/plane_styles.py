@@ -66,7 +66,7 @@ fuselage (twin) or at the plane's ends (ends), fin only (none), fin and canards 
 pods below the wing, at the rear, propellers on the wing or nose, twin nozzles, inside (none)."""
 
 _SPREAD = {
-    "radius": 0.1, "aspect": 0.05, "nose": 0.15, "tail": 0.12, "span": 0.09, "chord": 0.1,
+    "radius": 0.1, "aspect": 0.05, "nose": 0.28, "tail": 0.12, "span": 0.09, "chord": 0.1,
     "taper": 0.2, "tail_span": 0.1, "tail_chord": 0.1, "fin_height": 0.1, "fin_chord": 0.12,
     "thick": 0.12,
 }  # fmt: skip
@@ -129,6 +129,7 @@ def random_style(rng: np.random.Generator) -> Style:
         bump = float(np.clip(rng.normal(), -2, 2))
         value *= np.exp(_SPREAD.get(key, 0.0) * bump)
         d[key] = float(value + _SHIFT.get(key, 0.0) * bump)
+    d["nose"] = min(d["nose"], 0.4)
     d["square"] = max(d["square"], 1.9)
     d["sweep"] = max(d["sweep"], -0.03)
     return Style(
