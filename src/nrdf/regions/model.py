@@ -218,6 +218,20 @@ class Taught:
         normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
 
+    def unlikeness(self, index: int, target: Embedded) -> np.ndarray:
+        """How far the descriptor of each point of a target (n,) is from that of a reference point.
+
+        index: of the point in the reference's cloud; n: the target's working points. Distances of
+        descriptors (paper's θ) whose every component is scaled to its spread over the reference;
+        1 is as far as two of the reference's points usually are from each other.
+        """
+        k = self._k[0]
+        spread = k.std(dim=0).clamp_min(1e-6)
+        own = k[int(self.reference.nearest_working[index])] / spread
+        there = self._describe(target.points, target.normals, target.z)[0] / spread
+        usual = (k / spread - (k / spread).flip(0)).norm(dim=1).median()
+        return np.asarray(((there - own).norm(dim=1) / usual).cpu().numpy(), np.float64)
+
     def _judged(
         self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
     ) -> Match:
@@ -278,15 +292,18 @@ class Taught:
         mask[reference.nearest_working[indices]] = True
         return mask
 
-    def _describe(self, points: np.ndarray, normals: np.ndarray) -> torch.Tensor:
-        model = self.model
+    def _describe(
+        self, points: np.ndarray, normals: np.ndarray, z: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """Descriptors (1, m, d_k) of points (m, 3), on the reference or on the shape of z."""
+        model, z = self.model, self.reference.z if z is None else z
         parts = []
         with torch.inference_mode():
             for start in range(0, len(points), _CHUNK):
                 part = slice(start, start + _CHUNK)
                 parts.append(
                     model.field.describe(
-                        self.reference.z,
+                        z,
                         model.tensor(points[part])[None],
                         model.tensor(normals[part])[None],
                     )
