@@ -14,6 +14,8 @@ from nrdf.similarity import LEFT_FOR_RIGHT
 
 _NORMAL_WEIGHT = 6.0
 """How many spacings apart two places count whose normals are at right angles."""
+_ZIGZAG = 1.2
+"""How much longer than a straight line the way over points is on a flat surface, at most."""
 _MIRRORED = 4.0  # spacings within which a mirror image must have its counterpart
 
 
@@ -33,12 +35,24 @@ class Canvas:
 
     def distances(self, seeds: int | Sequence[int], limit: float) -> np.ndarray:
         """Distance (n,), m, along the surface to the nearest of some points; infinite past the
-        limit, and where no way leads."""
-        return np.asarray(
-            dijkstra(
-                self._ways, directed=False, indices=np.unique(seeds), limit=limit, min_only=True
-            )
+        limit, and where no way leads.
+
+        Ways from point to point zigzag: where one is hardly longer than the straight line, on what
+        is nearly flat, the straight line counts.
+        """
+        points = self.surface.points
+        way, _, source = dijkstra(
+            self._ways,
+            directed=False,
+            indices=np.unique(seeds),
+            limit=_ZIGZAG * limit,
+            min_only=True,
+            return_predecessors=True,
         )
+        met = np.flatnonzero(np.isfinite(way))
+        straight = np.linalg.norm(points[met] - points[source[met]], axis=1)
+        way[met] = np.where(way[met] <= _ZIGZAG * straight, straight, way[met])
+        return np.where(way <= limit, way, np.inf)
 
     def patch(self, seeds: int | Sequence[int], radius: float) -> np.ndarray:
         """The points (n,) bool within a radius, m, of one or more points along the surface."""

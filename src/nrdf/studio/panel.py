@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import viser
 
 from nrdf.studio.mouse import TOOLS
 from nrdf.studio.panel_object import ObjectTab
@@ -26,6 +31,14 @@ _HINTS = {
 }
 
 
+@dataclass(frozen=True)
+class Said:
+    """What a person has done in the panel: in which browser, and the value that was set."""
+
+    client: viser.ClientHandle
+    value: Any
+
+
 class Tab(Protocol):
     """One of the five steps."""
 
@@ -38,6 +51,8 @@ class Panel:
 
     def __init__(self, studio: Studio) -> None:
         self.studio, gui = studio, studio.server.gui
+        self._acts = ThreadPoolExecutor(1, "studio panel")
+        self._unheard: Counter[int] = Counter()
         gui.configure_theme(
             show_logo=False, show_share_button=False, brand_color=(0, 114, 178),
             control_width="large",
@@ -68,36 +83,51 @@ class Panel:
         self._tabs: tuple[Tab, ...] = (
             self.object, self.paint, self.process, self.targets, self.save,
         )  # fmt: skip
-        self.on(self.tool.on_click, lambda event: self._take(event.target.value))
-        self.on(self.region.on_update, lambda event: self._choose(event.target.value))
-        keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[Any], None]], ...] = (
+        self.on(self.tool.on_click, lambda said: self._take(said.value))
+        self.on(self.region.on_update, lambda said: self._choose(said.value))
+        keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[Said], None]], ...] = (
             ("Undo", "Z", self.undo), ("Redo", "Y", self.redo),
         )  # fmt: skip
         for label, hotkey, act in keys:
             command = gui.add_command(label, hotkey=hotkey, modifier="cmd/ctrl")
             self.on(command.on_trigger, act)
 
-    def on(self, register: Callable[..., Any], act: Callable[[Any], None]) -> None:
-        """Let a person's click or change call `act(event)`; not a value that the program sets."""
+    def on(self, register: Callable[..., Any], act: Callable[[Said], None]) -> None:
+        """Let a person's click or change call `act`, one after another in the order in which they
+        came; not a value that the program sets."""
 
-        def answer(event: Any) -> None:
-            if event.client is not None:
-                with self.studio.answering():
-                    act(event)
+        # Async: on the event loop, at once, before anything can set the input to another value.
+        async def answer(event: Any) -> None:
+            if event.client is None:
+                return
+            said = Said(event.client, getattr(event.target, "value", None))
+            self._unheard[id(event.target)] += 1
+            self._acts.submit(self._answer, act, said, id(event.target))
 
         register(answer)
 
+    def _answer(self, act: Callable[[Said], None], said: Said, handle: int) -> None:
+        with self.studio.answering():
+            self._unheard[handle] -= 1
+            act(said)
+
+    def put(self, handle: Any, value: Any) -> None:
+        """Show a value in an input, unless a person has just set it to another."""
+        if not self._unheard[id(handle)]:
+            handle.value = value
+
     @staticmethod
-    def put(handle: Any, value: Any) -> None:
-        """Show a value in an input."""
-        handle.value = value
+    def offer(handle: Any, options: tuple[str, ...]) -> None:
+        """Let a dropdown have these options."""
+        if handle.options != options:
+            handle.options = options
 
     def refresh(self) -> None:
         """Show what the document, the plans and the results say."""
         studio = self.studio
         names = [region.name for region in studio.desk.document.regions]
         with studio.server.atomic():
-            self.region.options = tuple(names) or (NO_REGION,)
+            self.offer(self.region, tuple(names) or (NO_REGION,))
             self.put(self.region, studio.region or NO_REGION)
             self.next.content = f"**Next:** {self._what_is_next()}"
             self.hint.content = f"**{studio.mouse.tool}**: {_HINTS[studio.mouse.tool]}"

@@ -10,7 +10,7 @@ from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled, read_upload
 from nrdf.units import METRES
 
 if TYPE_CHECKING:
-    from nrdf.studio.panel import Panel
+    from nrdf.studio.panel import Panel, Said
 
 AS_IN_FILE = "as the file says"
 TAUGHT = "chair with its five processes"
@@ -36,7 +36,7 @@ class ObjectTab:
         self.told = gui.add_markdown("")
         self.anew = gui.add_button("Start anew", color="gray")
         panel.on(self.open.on_click, lambda _: self._open())
-        panel.on(self.upload.on_upload, lambda event: self._load(event.target.value))
+        panel.on(self.upload.on_upload, lambda said: self._load(said.value))
         panel.on(self.anew.on_click, self._ask)
 
     def refresh(self) -> None:
@@ -65,7 +65,7 @@ class ObjectTab:
         self.studio.desk.open_reference(file.name, cloud, self.category.value)
         self.studio.restore()
 
-    def _ask(self, event: Any) -> None:
+    def _ask(self, said: Said) -> None:
         gui = self.studio.server.gui
         with gui.add_modal("Start anew?") as modal:
             gui.add_markdown(

@@ -12,7 +12,7 @@ from nrdf.process.report import short_figures
 from nrdf.studio.teaching import NUMBERS, PATTERNS, shown_numbers
 
 if TYPE_CHECKING:
-    from nrdf.studio.panel import Panel
+    from nrdf.studio.panel import Panel, Said
 
 _LABELS = {
     "stepover_mm": ("Between lines, mm", "stepover_mm: distance between neighbouring lines"),
@@ -60,13 +60,13 @@ class ProcessTab:
             self.steps = gui.add_button_group("Steps", ("Add one", "Remove this"))
         for name, handle in self.numbers.items():
             panel.on(handle.on_update, partial(self._number_set, name))
-        panel.on(self.kind.on_update, lambda event: self._kind(event.target.value))
-        panel.on(self.pattern.on_update, lambda event: self._change(trajectory=event.target.value))
+        panel.on(self.kind.on_update, lambda said: self._kind(said.value))
+        panel.on(self.pattern.on_update, lambda said: self._change(trajectory=said.value))
         panel.on(self.longest.on_click, lambda _: self._change(direction=None))
         panel.on(self.tool.on_update, lambda _: self._tool())
         panel.on(self.tool_radius.on_update, lambda _: self._tool())
-        panel.on(self.step.on_update, lambda event: self._step(event.target.value))
-        panel.on(self.steps.on_click, lambda event: self._steps(event.target.value))
+        panel.on(self.step.on_update, lambda said: self._step(said.value))
+        panel.on(self.steps.on_click, lambda said: self._steps(said.value))
 
     def refresh(self) -> None:
         """The step that is described now, and its plan."""
@@ -78,14 +78,14 @@ class ProcessTab:
         step = region.steps[studio.step]
         self.panel.put(self.kind, str(step["kind"]))
         pattern = str(step.get("trajectory", "raster"))
-        self.pattern.options = PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern)
+        self.panel.offer(self.pattern, PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern))
         self.panel.put(self.pattern, pattern)
         for name, value in shown_numbers(step).items():
             self.panel.put(self.numbers[name], value)
         self.panel.put(self.tool, str(step["tool"].get("name", "tool")))
         self.panel.put(self.tool_radius, float(f"{1e3 * step['tool']['radius_m']:.6g}"))
         names = tuple(f"{i + 1}: {s.get('name', s['kind'])}" for i, s in enumerate(region.steps))
-        self.step.options = names
+        self.panel.offer(self.step, names)
         self.panel.put(self.step, names[studio.step])
         direction = step.get("direction")
         self.direction.content = (
@@ -121,9 +121,9 @@ class ProcessTab:
         label, hint = _LABELS[name]
         return self.studio.server.gui.add_number(label, 0.0, step=_step(name), hint=hint)
 
-    def _number_set(self, name: str, event: Any) -> None:
+    def _number_set(self, name: str, said: Said) -> None:
         self.studio.need_region()
-        value = float(event.target.value)
+        value = float(said.value)
         if not np.isfinite(value):
             return
         self.studio.desk.change_numbers(self.studio.region, self.studio.step, {name: value})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nrdf.errors import ProcessError
 from nrdf.export.registry import FORMATS
@@ -12,7 +12,7 @@ from nrdf.studio.bench import Result
 from nrdf.studio.saving import save_job, save_knowledge, save_picture, save_programs, zipped
 
 if TYPE_CHECKING:
-    from nrdf.studio.panel import Panel
+    from nrdf.studio.panel import Panel, Said
     from nrdf.studio.worker import Progress
 
 NO_TARGET = "(none yet)"
@@ -35,31 +35,31 @@ class SaveTab:
         self.told = gui.add_markdown("")
         panel.on(self.knowledge.on_click, self._knowledge)
         panel.on(self.picture.on_click, self._picture)
-        panel.on(self.job.on_click, lambda event: self._job(event, page=False))
-        panel.on(self.page.on_click, lambda event: self._job(event, page=True))
+        panel.on(self.job.on_click, lambda said: self._job(said, page=False))
+        panel.on(self.page.on_click, lambda said: self._job(said, page=True))
         panel.on(self.programs.on_click, self._programs)
 
     def refresh(self) -> None:
         """Which targets there are."""
         keys = [key for key in self.studio.desk.objects()[1:] if key in self.studio.bench.results]
-        self.target.options = tuple(keys) or (NO_TARGET,)
+        self.panel.offer(self.target, tuple(keys) or (NO_TARGET,))
 
-    def _knowledge(self, event: Any) -> None:
+    def _knowledge(self, said: Said) -> None:
         place = save_knowledge(self.studio.desk)
-        event.client.send_file_download("knowledge.zip", zipped(place), save_immediately=True)
+        said.client.send_file_download("knowledge.zip", zipped(place), save_immediately=True)
         self._tell(place, f"nrdf knowledge check {next(place.glob('*.yaml'))}")
 
-    def _picture(self, event: Any) -> None:
+    def _picture(self, said: Said) -> None:
         def work(progress: Progress) -> None:
             progress(0, 1)
             place = save_picture(self.studio.desk, self.studio.bench)
             content = place.read_bytes()
-            event.client.send_file_download("nrdf.png", content, save_immediately=True)
+            said.client.send_file_download("nrdf.png", content, save_immediately=True)
             self._tell(place)
 
         self.studio.worker.submit("save", "drawing the picture", work)
 
-    def _job(self, event: Any, page: bool) -> None:
+    def _job(self, said: Said, page: bool) -> None:
         name, result = self._chosen()
 
         def work(progress: Progress) -> None:
@@ -69,16 +69,16 @@ class SaveTab:
                 content, file = (place / PAGE).read_bytes(), f"{name}.html"
             else:
                 content, file = zipped(place), f"{name}-job.zip"
-            event.client.send_file_download(file, content, save_immediately=True)
+            said.client.send_file_download(file, content, save_immediately=True)
             self._tell(place / PAGE if page else place, f"nrdf export {place} --format urscript")
 
         self.studio.worker.submit("save", "writing the job and its pictures", work)
 
-    def _programs(self, event: Any) -> None:
+    def _programs(self, said: Said) -> None:
         name, result = self._chosen()
         place = save_programs(self.studio.desk, name, result, (self.format.value,))
         file = f"{name}-{self.format.value}.zip"
-        event.client.send_file_download(file, zipped(place), save_immediately=True)
+        said.client.send_file_download(file, zipped(place), save_immediately=True)
         self._tell(place)
 
     def _chosen(self) -> tuple[str, Result]:

@@ -42,18 +42,18 @@ class TargetsTab:
         )  # fmt: skip
         self.more = gui.add_button_group("This target", ("Forget my painting", "Remove"))
         panel.on(self.add.on_click, lambda _: self._add(self.bundled.value))
-        panel.on(self.upload.on_upload, lambda event: self._load(event.target.value))
+        panel.on(self.upload.on_upload, lambda said: self._load(said.value))
         panel.on(self.bring.on_click, lambda _: self._bring())
-        panel.on(self.shown.on_update, lambda event: self._show(event.target.value))
+        panel.on(self.shown.on_update, lambda said: self._show(said.value))
         panel.on(self.colours.on_update, lambda _: self._recolour())
         panel.on(self.width.on_update, lambda _: self._recolour())
-        panel.on(self.more.on_click, lambda event: self._more(event.target.value))
+        panel.on(self.more.on_click, lambda said: self._more(said.value))
 
     def refresh(self) -> None:
         """Every target's result."""
         studio = self.studio
         keys = studio.desk.objects()[1:]
-        self.shown.options = (ALL, *keys)
+        self.panel.offer(self.shown, (ALL, *keys))
         self.panel.put(self.shown, studio.beside if studio.beside in keys else ALL)
         self.panel.put(self.colours, studio.colouring)
         self.told.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."

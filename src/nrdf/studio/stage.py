@@ -10,9 +10,10 @@ import viser
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit
 
+FOV_RAD = np.radians(48.0)
 _GAP = 0.25  # between objects, in sides of the largest
-_SIZE = 1.45  # of a point, in spacings
-_LIFT = 1.0  # of lines above the surface, in spacings
+_SIZE = 1.38  # of a point, in spacings
+_LIFT = 1.4  # of lines above the surface, in spacings
 _LIGHT = np.array([0.62, 0.70, 0.35])
 """Where the light comes from: front, above, right."""
 _DARKEST = 0.58  # share of its colour that a point has whose side faces away from the light
@@ -150,6 +151,7 @@ class Stage:
         self.factor = 1.0
         self._made = 0
         server.scene.set_up_direction("+y")
+        server.initial_camera.fov = FOV_RAD
 
     def clear(self, factor: float) -> None:
         """Take everything away."""
@@ -197,7 +199,7 @@ class Stage:
         low, high = (np.min(corners, axis=0), np.max(corners, axis=0)) if corners else (
             np.zeros(3), np.ones(3))  # fmt: skip
         middle, size = (low + high) / 2, high - low
-        away = max(0.95 * size[1], 0.7 * size[2]) + size[0] / 2
+        away = max(1.3 * size[1], 1.05 * size[2]) + size[0] / 2
         place = middle + away * np.array([0.92, 0.62, 0.42 if len(corners) <= 2 else 0.25])
         return place, middle
 
