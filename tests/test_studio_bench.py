@@ -9,8 +9,6 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-
 import nrdf
 from nrdf.errors import NrdfError, ProcessError, RegionError
 from nrdf.process.lesson import read_lesson
@@ -118,7 +116,7 @@ def test_a_marked_region_must_be_taught_and_on_the_target(bench):
     teacher, target = bench.results["new"].teacher, bench.results["new"].embedded
     with pytest.raises(RegionError, match="no taught region 'lid'; known: top, front"):
         teacher.transfer(target, marked={"lid": [1, 2]})
-    with pytest.raises(RegionError, match="region 'top' on the target: .*are not on"):
+    with pytest.raises(RegionError, match=r"region 'top' on the target: .*are not on"):
         teacher.transfer(target, marked={"top": [[9.0, 9.0, 9.0]]})
 
 

@@ -7,8 +7,6 @@ import time
 import numpy as np
 import pytest
 
-pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-
 from nrdf.bundled import bundled_chair
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit, inside
@@ -40,9 +38,7 @@ def test_a_patch_is_round_on_what_is_flat_and_does_not_go_through(chair):
 def test_ways_lead_around_what_is_thin(chair):
     body, regions = chair
     seed = middle(body, regions["back-front"])
-    behind = regions["back-back"] & (
-        np.linalg.norm(body.points - body.points[seed], axis=1) < 0.04
-    )
+    behind = regions["back-back"] & (np.linalg.norm(body.points - body.points[seed], axis=1) < 0.04)
     assert behind.any() and (body.canvas.distances(seed, 0.15)[behind] > 0.15).all()
 
 

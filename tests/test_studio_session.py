@@ -7,8 +7,6 @@ import json
 import numpy as np
 import pytest
 
-pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-
 from nrdf.errors import OutputError, ProcessError, RegionError
 from nrdf.process.knowledge_file import read_knowledge
 from nrdf.process.lesson import read_lesson

@@ -6,8 +6,6 @@ import threading
 
 import pytest
 
-pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-
 from nrdf.errors import ProcessError
 from nrdf.studio.worker import Worker
 

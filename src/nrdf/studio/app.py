@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _PLAN_AFTER_S = 0.4
+_ASPECT = 1.2  # width over height of a page that is not open yet
 _PATCH = 0.08  # first radius of a patch, in sides of the object
 
 
@@ -125,10 +126,11 @@ class Studio:
         """Let what is to be seen stand side by side, and every camera see all of it."""
         shown = self.shown()
         self.stage.arrange(shown)
-        place, middle = self.stage.camera(shown)
+        place, middle = self.stage.camera(shown, _ASPECT)
         initial = self.server.initial_camera
         initial.position, initial.look_at = tuple(place), tuple(middle)
         for client in self.server.get_clients().values():
+            place, middle = self.stage.camera(shown, client.camera.aspect)
             with client.atomic():
                 client.camera.position = place
                 client.camera.look_at = middle

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 import viser
 
+from nrdf.process.surface import unit
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit
 
 FOV_RAD = np.radians(48.0)
+_FROM = np.array([0.86, 0.52, 0.34])
+"""Where the camera stands, seen from the objects: before them, above, to their right."""
+_ROOM = 1.06  # times the distance at which all is just seen
+_ABOVE = 0.08  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
 _SIZE = 1.38  # of a point, in spacings
 _LIFT = 1.4  # of lines above the surface, in spacings
@@ -51,11 +57,20 @@ class Figure:
         self.label = scene.add_label(
             f"{self.path}/label",
             key,
-            position=tuple(self.top * stage.factor + np.array([0.0, 0.1, 0.0])),
+            position=tuple(self.top * stage.factor + np.array([0.0, _ABOVE, 0.0])),
             anchor="bottom-center",
         )
         self._lines: list[viser.SceneNodeHandle] = []
         self._arrows: dict[str, viser.SceneNodeHandle] = {}
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The corners (8, 3) of the object's bounding box in the scene, room for the label above
+        included."""
+        low, high = self.body.low * self.stage.factor, self.body.high * self.stage.factor
+        high[1] += _ABOVE
+        choice = np.array(list(product((False, True), repeat=3)))
+        return np.where(choice, high, low) + self.offset
 
     @property
     def top(self) -> np.ndarray:
@@ -189,19 +204,21 @@ class Stage:
             figure.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
 
-    def camera(self, shown: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Where a camera stands to see the objects `shown`, and what it looks at."""
-        corners = [
-            corner * self.factor + figure.offset
-            for key, figure in self.figures.items() if key in shown
-            for corner in (figure.body.low, figure.body.high)
-        ]  # fmt: skip
-        low, high = (np.min(corners, axis=0), np.max(corners, axis=0)) if corners else (
-            np.zeros(3), np.ones(3))  # fmt: skip
-        middle, size = (low + high) / 2, high - low
-        away = max(1.3 * size[1], 1.05 * size[2]) + size[0] / 2
-        place = middle + away * np.array([0.92, 0.62, 0.42 if len(corners) <= 2 else 0.25])
-        return place, middle
+    def camera(self, shown: Sequence[str], aspect: float) -> tuple[np.ndarray, np.ndarray]:
+        """Where a camera with that width over height stands to see the objects `shown` from the
+        front, and what it looks at."""
+        figures = [figure for key, figure in self.figures.items() if key in shown]
+        corners = np.array([corner for figure in figures for corner in figure.corners])
+        if not len(corners):
+            corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        toward = unit(_FROM)
+        right = unit(np.cross([0.0, 1.0, 0.0], toward))
+        axes = np.stack([right, np.cross(toward, right), toward])
+        seen = (corners - middle) @ axes.T
+        half = np.tan(FOV_RAD / 2) * np.array([aspect, 1.0])
+        away = float((np.abs(seen[:, :2]) / half + seen[:, 2:]).max())
+        return middle + _ROOM * away * toward, middle
 
     def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[Figure, int] | None:
         """The object and its shown point that a ray meets first."""
