@@ -126,11 +126,11 @@ def test_an_incomplete_document_is_refused(bench):
         bench.transfer(bench.desk.document, silent)
 
 
-def test_likeness_is_greatest_at_the_point_itself(bench):
+def test_likeness_is_greatest_around_the_point_itself(bench):
     document = bench.desk.document
     away = bench.unlikeness(document, 17, REFERENCE)
-    assert away.argmin() == 17 and away[17] == pytest.approx(0, abs=1e-3)
-    assert 0.3 < np.median(away) < 3.0
+    # An untrained C finds each of a shape's points on the same shape again.
+    assert away.argmin() == 17 and away[17] == pytest.approx(0, abs=1e-5)
     with pytest.raises(NrdfError, match="step 4"):
         bench.unlikeness(document, 17, "new")
     bench.transfer(document, silent)

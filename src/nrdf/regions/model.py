@@ -17,7 +17,7 @@ from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, oriented_features, snap, voters
 from nrdf.regions.embedded import Embedded, encoder_subset
 from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
@@ -219,18 +219,19 @@ class Taught:
         return self._invert(target, self._describe(points, normals), normals)
 
     def unlikeness(self, index: int, target: Embedded) -> np.ndarray:
-        """How far the descriptor of each point of a target (n,) is from that of a reference point.
+        """How far what each point of a target (n,) describes is from a point of the reference.
 
-        index: of the point in the reference's cloud; n: the target's working points. Distances of
-        descriptors (paper's θ) whose every component is scaled to its spread over the reference;
-        1 is as far as two of the reference's points usually are from each other.
+        index: of the point in the reference's cloud; n: the target's working points, or the
+        reference's own. Descriptors of two shapes are compared by the places on the reference that
+        C finds for them, C(z_reference, θ(z_target, x)): canonical distances, in position and
+        weighted normal. Raises ModelError for a field without C.
         """
-        k = self._k[0]
-        spread = k.std(dim=0).clamp_min(1e-6)
-        own = k[int(self.reference.nearest_working[index])] / spread
-        there = self._describe(target.points, target.normals, target.z)[0] / spread
-        usual = (k / spread - (k / spread).flip(0)).norm(dim=1).median()
-        return np.asarray(((there - own).norm(dim=1) / usual).cpu().numpy(), np.float64)
+        own = int(self.reference.nearest_working[index])
+        k = self._describe(target.points, target.normals, target.z)
+        landed = self._invert(self.reference, k, target.normals)
+        there = oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
+        here = oriented_features(self.reference.points, self.reference.normals, NORMAL_WEIGHT)
+        return np.asarray(np.linalg.norm(there - here[own], axis=1))
 
     def _judged(
         self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped

@@ -56,7 +56,7 @@ class Studio:
         self.stage = Stage(server)
         self.lock = threading.RLock()
         self.region, self.step, self.radius_m = "", 0, 0.05
-        self.colouring, self.width = COLOURINGS[0], 0.4
+        self.colouring, self.width = COLOURINGS[0], 0.15
         self.beside: str | None = None
         """The one target that is shown beside the reference, None for all."""
         self._likeness: dict[str, np.ndarray] = {}
@@ -140,7 +140,8 @@ class Studio:
         with self.lock, self.server.atomic():
             for key, figure in self.stage.figures.items():
                 self.draw_colours(figure)
-                figure.draw_lines(lines_of(self.desk, self.bench, key))
+                lines = {} if self._alike(figure) else lines_of(self.desk, self.bench, key)
+                figure.draw_lines(lines)
                 figure.name(title_of(self.desk, self.bench, key))
             if REFERENCE in self.stage.figures:
                 ends = direction_of(self.desk, self.region, self.step)
@@ -148,19 +149,25 @@ class Studio:
 
     def draw_colours(self, figure: Figure) -> None:
         """The colours of one object."""
-        likeness = self._likeness.get(figure.key)
-        if self.colouring == "likeness" and likeness is not None:
-            figure.paint(likeness_colours(likeness, self.width))
+        if self._alike(figure):
+            figure.paint(likeness_colours(self._likeness[figure.key], self.width))
         else:
             by_confidence = self.colouring == "confidence"
             figure.paint(colours_of(self.desk, self.bench, figure.key, by_confidence))
 
     def recolour(self, colouring: str, width: float) -> None:
-        """Colour by something else, or another width of likeness."""
-        with self.lock, self.server.atomic():
+        """Colour by something else, or another width of likeness.
+
+        Raises NrdfError for likeness where no point has been asked for.
+        """
+        with self.lock:
+            if colouring == "likeness" and not self._likeness:
+                raise NrdfError("take 'Alike' and click a point of the reference first")
             self.colouring, self.width = colouring, width
-            for figure in self.stage.figures.values():
-                self.draw_colours(figure)
+            self.draw()
+
+    def _alike(self, figure: Figure) -> bool:
+        return self.colouring == "likeness" and figure.key in self._likeness
 
     def painted(self) -> None:
         """What follows a change of regions: lines that no longer hold go, and new ones come."""

@@ -166,8 +166,11 @@ class Bench:
     # --- likeness
 
     def unlikeness(self, document: Document, index: int, key: str) -> np.ndarray:
-        """How far the descriptors of an object's shown points (k,) are from that of a shown point
-        of the reference. Raises NrdfError for a target to which nothing has been brought yet."""
+        """How far what an object's shown points (k,) describe is from a shown point of the
+        reference (`Taught.unlikeness`).
+
+        Raises NrdfError for a target to which nothing has been brought yet.
+        """
         if key == REFERENCE:
             teacher = self._taught(document)
             return teacher.taught.unlikeness(index, teacher.taught.reference)

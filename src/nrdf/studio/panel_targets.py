@@ -37,8 +37,8 @@ class TargetsTab:
             hint="regions: paler where less sure. confidence: green sure, red in doubt.",
         )  # fmt: skip
         self.width = gui.add_slider(
-            "Likeness reaches", 0.05, 1.5, 0.05, 0.4,
-            hint="How unlike a descriptor may be and still light up, after a click with Alike.",
+            "Likeness reaches", 0.02, 0.6, 0.01, 0.15,
+            hint="How far a point may be from like the one clicked with Alike, and still light up.",
         )  # fmt: skip
         self.more = gui.add_button_group("This target", ("Forget my painting", "Remove"))
         panel.on(self.add.on_click, lambda _: self._add(self.bundled.value))

@@ -16,7 +16,7 @@ FOV_RAD = np.radians(48.0)
 _FROM = np.array([0.86, 0.52, 0.34])
 """Where the camera stands, seen from the objects: before them, above, to their right."""
 _ROOM = 1.06  # times the distance at which all is just seen
-_ABOVE = 0.08  # of the label above the object, in the scene
+_ABOVE = 0.14  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
 _SIZE = 1.38  # of a point, in spacings
 _LIFT = 1.4  # of lines above the surface, in spacings
