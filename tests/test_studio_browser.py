@@ -16,7 +16,6 @@ import pytest
 pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 pytest.importorskip("playwright", reason="pip install playwright")
 
-import viser
 from playwright import sync_api
 
 import nrdf
@@ -26,6 +25,7 @@ from nrdf.process.toolpath import read_job
 from nrdf.studio.app import Studio
 from nrdf.studio.body import REFERENCE
 from nrdf.studio.mouse import view_of
+from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
 
 SHOTS = Path(__file__).parents[1] / "build" / "studio"
@@ -115,7 +115,7 @@ class Person:
 
 @pytest.fixture
 def studio(tmp_path):
-    server = viser.ViserServer("127.0.0.1", 8480, label="nrdf studio", verbose=False)
+    server = open_server("127.0.0.1", 8480)
     made = Studio(Session(tmp_path / "session"), server, nrdf.load_model, ["chair"], {})
     yield made
     made.worker.stop()

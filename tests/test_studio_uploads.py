@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nrdf import cli
 from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import CloudError, ProcessError
 from nrdf.studio import uploads
@@ -69,13 +68,3 @@ def test_names_are_short_and_printable():
 def test_a_dense_reference_is_thinned_as_the_model_does():
     dense = PointCloud(np.random.default_rng(0).normal(size=(20_000, 3)), unit="m")
     assert len(to_paint_on(dense)) == 16_384
-
-
-def test_the_verb_says_what_is_wrong(tmp_path, capsys):
-    pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-    assert cli.run(["studio", "--port", "0", "--no-browser"]) == 2
-    assert "--port 0: must be from 1 to 65535" in capsys.readouterr().err
-    (tmp_path / "file").write_text("")
-    words = ["studio", "--session", str(tmp_path / "file" / "s"), "--no-browser"]
-    assert cli.run(words) == 2
-    assert "give another one with --session" in " ".join(capsys.readouterr().err.split())

@@ -12,13 +12,13 @@ import tempfile
 import time
 from pathlib import Path
 
-import viser
 from playwright.sync_api import sync_playwright
 
 import nrdf
 from nrdf.bundled import KNOWLEDGE, REFERENCE, TARGETS
 from nrdf.process.lesson import read_lesson
 from nrdf.studio.app import Studio
+from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
 from nrdf.studio.uploads import bundled
 
@@ -30,7 +30,7 @@ SIZE = {"width": 1500, "height": 900}
 
 def main() -> None:
     """Set the studio up, open it and take the picture."""
-    server = viser.ViserServer("127.0.0.1", 8490, label="nrdf studio", verbose=False)
+    server = open_server("127.0.0.1", 8490)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         studio = Studio(Session(folder), server, nrdf.load_model, ["chair"], {})
         studio.desk.open_lesson(REFERENCE, read_lesson(KNOWLEDGE))

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from nrdf.commands.console import command_line, console, errors, versions
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-
 
 def studio(
     session: Path = Path("studio"),
@@ -33,10 +31,8 @@ def studio(
     """
     from nrdf.errors import OutputError
 
-    if not 1 <= port <= 65535:
-        raise OutputError(f"--port {port}: must be from 1 to 65535")
     try:
-        import viser
+        import viser  # noqa: F401
     except ImportError:
         raise OutputError(
             "the studio needs viser: pip install 'nrdf[studio]' (or pip install viser)"
@@ -44,13 +40,11 @@ def studio(
     import nrdf
     from nrdf.field.zoo import list_models
     from nrdf.studio.app import Studio
+    from nrdf.studio.serving import LOOPBACK, open_server
     from nrdf.studio.session import Session
 
     kept = Session(session)
-    try:
-        server = viser.ViserServer(host, port, label="nrdf studio", verbose=False)
-    except (OSError, RuntimeError) as error:
-        raise OutputError(f"cannot listen on {host}, port {port}: {error}") from None
+    server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     categories = [entry.category for entry in list_models()]
     app = Studio(kept, server, lambda name: nrdf.load_model(name, device), categories, origin)
