@@ -44,11 +44,13 @@ class Figure:
             precision="float32",
         )
         size = (body.high - body.low) * stage.factor
-        # Nothing to see: what a drag that paints must begin on.
+        # Nothing to see: what a drag that paints must begin on. Only lines, for slow renderers.
         self.ground = scene.add_box(
             f"{self.path}/ground",
             dimensions=tuple(1.02 * size),
             position=tuple((body.low + body.high) / 2 * stage.factor),
+            wireframe=True,
+            flat_shading=False,
             opacity=0.0,
             cast_shadow=False,
             receive_shadow=False,
