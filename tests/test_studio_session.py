@@ -72,6 +72,15 @@ def test_undo_and_redo_also_on_disk(painted):
     assert not painted.session.redo(), "what came after an undone change is gone"
 
 
+def test_clouds_that_nothing_needs_any_more_go_when_it_starts_again(painted):
+    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    painted.remove_target("other")
+    assert painted.session.undo() and len(list((painted.session.folder / "clouds").iterdir())) == 2
+    painted.session.redo()
+    kept = again(painted)
+    assert [p.name for p in (kept.folder / "clouds").iterdir()] == [kept.document.reference.file]
+
+
 def test_starting_anew_can_be_undone(painted):
     painted.start_anew()
     assert painted.objects() == [] and again(painted).document.reference is None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -87,7 +87,8 @@ class Bench:
     def plan(self, region: Painted, number: int) -> Plan | None:
         """A step's plan, None where it has not been made yet for what is painted and filled in."""
         kept = self._plans.get((region.name, number))
-        return kept[1] if kept is not None and kept[0] == _basis(region, number) else None
+        basis = _basis(self.desk.document, region, number)
+        return kept[1] if kept is not None and kept[0] == basis else None
 
     def planned(self, region: Painted) -> list[np.ndarray]:
         """The lines (m, 3) of a region's steps that are planned."""
@@ -103,7 +104,10 @@ class Bench:
         ]  # fmt: skip
         for done, (region, number) in enumerate(waiting):
             progress(done, len(waiting))
-            self._plans[region.name, number] = _basis(region, number), self._made(region, number)
+            if self.desk.document.reference is not document.reference:
+                return
+            basis = _basis(document, region, number)
+            self._plans[region.name, number] = basis, self._made(region, number)
 
     def _made(self, region: Painted, number: int) -> Plan:
         body = self.desk.body(REFERENCE)
@@ -180,12 +184,11 @@ class Bench:
         return result.teacher.taught.unlikeness(index, result.embedded)
 
 
-def _basis(region: Painted, number: int) -> bytes:
+def _basis(document: Document, region: Painted, number: int) -> bytes:
     """What a plan depends on."""
-    step: Mapping[str, object] = region.steps[number]
-    return region.name.encode() + json.dumps(step, sort_keys=True).encode() + np.packbits(
-        region.mask
-    ).tobytes()  # fmt: skip
+    reference = "" if document.reference is None else document.reference.file
+    said = json.dumps([reference, region.name, dict(region.steps[number])], sort_keys=True)
+    return said.encode() + np.packbits(region.mask).tobytes()
 
 
 def _same_lesson(one: Document, other: Document) -> bool:

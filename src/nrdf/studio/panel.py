@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from nrdf.studio.app import Studio
 
 NO_REGION = "(none yet)"
+_LONG_S = 0.7
 _HINTS = {
     "Turn": "drag turns, the wheel zooms, the right button moves.",
     "Grow": "click the surface: a patch grows from there. Its **radius** is in step 2.",
@@ -53,6 +55,7 @@ class Panel:
         self.studio, gui = studio, studio.server.gui
         self._acts = ThreadPoolExecutor(1, "studio panel")
         self._unheard: Counter[int] = Counter()
+        self._since = 0.0
         gui.configure_theme(
             show_logo=False, show_share_button=False, brand_color=(0, 114, 178),
             control_width="large",
@@ -138,10 +141,12 @@ class Panel:
         """Long work begins."""
         self.doing.content = f"*{what} …*"
         self.put(self.bar, 0.0)
-        self.doing.visible = self.bar.visible = self.cancel.visible = True
+        self._since = time.monotonic()
 
     def progress(self, done: int, total: int) -> None:
-        """So much of it is done."""
+        """So much of it is done; shown once it takes long, so that the panel does not jump."""
+        if time.monotonic() - self._since > _LONG_S:
+            self.doing.visible = self.bar.visible = self.cancel.visible = True
         self.put(self.bar, min(100.0, 100.0 * done / max(total, 1)))
 
     def ended(self) -> None:

@@ -108,6 +108,7 @@ class Session:
             ) from None
         self.restored = (self.folder / FILE).exists()
         self.document = _read(self.folder) if self.restored else Document()
+        self._tidy()
 
     def change(self, document: Document, merge: bool = False) -> None:
         """Replace the document, and save it. `merge`: as a part of the last change, undone with it.
@@ -143,6 +144,15 @@ class Session:
     def path_of(self, loaded: Loaded) -> Path:
         """The file of an object's cloud."""
         return self.folder / CLOUDS / loaded.file
+
+    def _tidy(self) -> None:
+        """Remove clouds that only changes undone in an earlier run had."""
+        document = self.document
+        objects = [target.object for target in document.targets]
+        objects += [] if document.reference is None else [document.reference]
+        for path in (self.folder / CLOUDS).glob("cloud-*.ply"):
+            if path.name not in {loaded.file for loaded in objects}:
+                path.unlink(missing_ok=True)
 
     def _go(self, taken: list[Document], kept: list[Document]) -> bool:
         if not taken:
