@@ -5,6 +5,7 @@ Screenshots of every step are left in build/studio/.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import time
@@ -130,6 +131,14 @@ class Person:
     def reads(self, text: str) -> None:
         self.page.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE_S)
 
+    def close_notes(self) -> None:
+        """Close the notifications, which lie over the objects."""
+        notes = self.page.locator(".mantine-Notification-closeButton")
+        until(lambda: notes.count() > 0, "a notification")
+        while notes.count():
+            with contextlib.suppress(sync_api.Error):
+                notes.first.click(timeout=5e3)
+
     def shoot(self, name: str) -> None:
         self.shots += 1
         self.page.screenshot(path=SHOTS / f"{self.shots}-{name}.png", timeout=60e3)
@@ -180,6 +189,7 @@ def test_five_steps(person, studio, tmp_path):
     bad.write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
     page.locator("input[type=file]").first.set_input_files(bad)
     person.reads("notes.ply")
+    person.close_notes()
     person.press("Open the bundled chair")
     person.reads("8192 points")
 
