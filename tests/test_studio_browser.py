@@ -255,6 +255,7 @@ def test_five_steps(person, studio, tmp_path):
     person.shoot("target")
     person.press("Alike")
     person.click_on(REFERENCE, seat, lambda: studio.colouring == "likeness")
+    sync_api.expect(person.field("Colours")).to_have_value("likeness")
     time.sleep(1.0)  # for the picture alone
     person.shoot("likeness")
     person.press("Grow")
