@@ -18,11 +18,10 @@ from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
 from nrdf.studio.session import Document, Painted, Target
 from nrdf.studio.teaching import lesson_of, process_of
+from nrdf.studio.worker import Progress
 
 if TYPE_CHECKING:
     from nrdf.regions.model import Model
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

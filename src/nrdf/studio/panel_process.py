@@ -42,7 +42,9 @@ class ProcessTab:
         )
         self.pattern = gui.add_dropdown("Pattern", PATTERNS)
         self.numbers = {
-            name: gui.add_number(_LABELS[name][0], 0.0, step=_step(name), hint=_LABELS[name][1])
+            name: gui.add_number(
+                _LABELS[name][0], 0.0, step=_increment(name), hint=_LABELS[name][1]
+            )
             for name in NUMBERS[:2]
         }
         self.direction = gui.add_markdown("")
@@ -119,7 +121,7 @@ class ProcessTab:
 
     def _number(self, name: str) -> Any:
         label, hint = _LABELS[name]
-        return self.studio.server.gui.add_number(label, 0.0, step=_step(name), hint=hint)
+        return self.studio.server.gui.add_number(label, 0.0, step=_increment(name), hint=hint)
 
     def _number_set(self, name: str, said: Said) -> None:
         self.studio.need_region()
@@ -168,5 +170,5 @@ class ProcessTab:
         self.studio.plan()
 
 
-def _step(name: str) -> float:
+def _increment(name: str) -> float:
     return 1.0 if name.endswith(("_mm", "_s", "_rpm", "passes")) else 0.5
