@@ -1,4 +1,5 @@
 # make demo: an environment, then nrdf at work on bundled shapes, in demo/
+# make studio: an environment, then the studio in a browser; its session is kept in studio/
 # make test: an environment with the tools, then ruff, mypy and all tests
 # Another interpreter: make PYTHON=/path/to/python3.12 test
 
@@ -9,11 +10,14 @@ SUITABLE := -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10)
 PYTHON ?= $(shell for name in $(CANDIDATES); do \
 	$$name $(SUITABLE) 2>/dev/null && { echo $$name; break; }; done)
 
-.PHONY: demo test format clean
+.PHONY: demo studio test format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/nrdf.stamp
 	$(BIN)/nrdf demo --out demo --overwrite
+
+studio: $(VENV)/studio.stamp
+	$(BIN)/nrdf studio
 
 test: $(VENV)/dev.stamp
 	$(BIN)/ruff check .
@@ -34,9 +38,13 @@ $(VENV)/nrdf.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
 	@touch $@
 
+$(VENV)/studio.stamp: pyproject.toml constraints.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[studio]'
+	@touch $@ $(VENV)/nrdf.stamp
+
 $(VENV)/dev.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
-	@touch $@ $(VENV)/nrdf.stamp
+	@touch $@ $(VENV)/nrdf.stamp $(VENV)/studio.stamp
 
 clean:
 	rm -rf $(VENV) demo

@@ -158,3 +158,20 @@ def test_the_targets_unit_is_asked_for_where_nothing_tells_it(taught, untrained,
     write_cloud(taught / "new.ply", PointCloud(cloud(seed=1).points, unit="m"))
     assert transfer(taught, untrained, "--unit", "mm", "--overwrite") == 2
     assert "--unit is mm, but the file says m" in capsys.readouterr().err
+
+
+def test_a_region_marked_on_the_target_is_taken_instead_of_what_is_found(taught, untrained, capsys):
+    new = cloud(SIZE, seed=1)
+    chosen = faces(new)["top"][:200]
+    (taught / "marked").mkdir()
+    marked = taught / "marked" / "top.ply"
+    write_cloud(marked, PointCloud(1000 * new.points[chosen], None, "mm"))
+    assert transfer(taught, untrained, "--region", str(marked)) == 0
+    report = json.loads((taught / "job" / "report.json").read_text())
+    top = report["regions"]["top"]
+    assert top["confidence"] == 1.0 and top["points"] == 200
+    assert report["regions"]["front"]["confidence"] < 1.0
+    marked.rename(taught / "marked" / "lid.ply")
+    words = ("--region", str(taught / "marked" / "lid.ply"), "--overwrite")
+    assert transfer(taught, untrained, *words) == 2
+    assert "no taught region 'lid'; known: top, front" in capsys.readouterr().err

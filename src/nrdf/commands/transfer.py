@@ -25,6 +25,7 @@ def transfer(
     sensor: tuple[float, ...] = (),
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
+    region: tuple[Path, ...] = (),
     min_confidence: float | None = None,
     min_coverage: float | None = None,
     max_line_spacing_mm: float | None = None,
@@ -55,6 +56,8 @@ def transfer(
         sensor: Where the scan's sensors stood: x y z of each. The file may say so as well.
         skip: Steps of cleaning the scan to leave out.
         topic: What to read of a ROS 2 bag that has clouds under several topics.
+        region: Region files of the target, marked by hand, named after taught regions: they are
+            taken instead of what is found.
         min_confidence: Regions found with less mean confidence are taken to be absent (0.2).
         min_coverage: Limit on the share of each region that its tool reaches, 0 to 1.
         max_line_spacing_mm: Limit on the distance between neighbouring lines.
@@ -100,12 +103,13 @@ def transfer(
             known = _scan_unit(scan, target)
         with errors.status("reference"):
             teacher = Teacher(lesson, loaded)
+        marked = _marked(region, known)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
             if scan is None:
-                transferred = teacher.transfer(cloud, known, least)
+                transferred = teacher.transfer(cloud, known, least, marked)
             else:
-                transferred = teacher.transfer(scan.embed_in_metres(known), None, least)
+                transferred = teacher.transfer(scan.embed_in_metres(known), None, least, marked)
                 warnings = (*scan.doubts, *transferred.warnings)
                 transferred = replace(transferred, warnings=warnings)
         origin = {
@@ -139,6 +143,15 @@ def show_transfer(report: dict[str, Any]) -> None:
     show(shown)
     for warning in report["warnings"]:
         errors.print(warning, style="yellow")
+
+
+def _marked(files: tuple[Path, ...], unit: str) -> dict[str, Any]:
+    """Regions that a person has marked on the target, points in metres."""
+    from nrdf.regions.files import read_regions
+    from nrdf.units import METRES
+
+    found = read_regions(files, unit) if files else {}
+    return {n: v if v.ndim == 1 else v * METRES[unit] for n, v in found.items()}
 
 
 def _scan_unit(scan: AlignedScan, target: Path) -> str:

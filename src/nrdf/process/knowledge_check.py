@@ -17,6 +17,7 @@ from nrdf.process.report import measure_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.surface import Surface
 from nrdf.process.taught import normals_under, taught_lines
+from nrdf.process.toolpath import Segment
 from nrdf.regions.model import WORKING_POINTS
 from nrdf.units import in_words
 
@@ -24,13 +25,14 @@ from nrdf.units import in_words
 @dataclass(frozen=True)
 class Checked:
     """A process on its region of the reference. fault: why it cannot be done, or ""; warnings:
-    what to look at; measures: None where it cannot be done."""
+    what to look at; segments and measures of its tool path: none where it cannot be done."""
 
     region: str
     process: Process
     fault: str = ""
     warnings: tuple[str, ...] = ()
     measures: Measures | None = None
+    segments: tuple[Segment, ...] = ()
 
     @property
     def where(self) -> str:
@@ -49,13 +51,14 @@ def check(lesson: Lesson, progress: Callable[[int, int], None] | None = None) ->
     steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.processes]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
-        checked.append(_checked(surface, name, regions[name], process))
+        checked.append(check_process(surface, name, regions[name], process))
         if progress is not None:
             progress(done, len(steps))
     return checked
 
 
-def _checked(surface: Surface, name: str, region: np.ndarray, process: Process) -> Checked:
+def check_process(surface: Surface, name: str, region: np.ndarray, process: Process) -> Checked:
+    """One process planned and measured on a region, indices (k,) of the surface's points."""
     warnings = []
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
     if process.trajectory != "taught" and stepover > width:
@@ -77,4 +80,4 @@ def _checked(surface: Surface, name: str, region: np.ndarray, process: Process) 
     except ProcessError as error:
         return Checked(name, process, str(error), tuple(warnings))
     warnings += measure_warnings(process, measures)
-    return Checked(name, process, "", tuple(warnings), measures)
+    return Checked(name, process, "", tuple(warnings), measures, tuple(segments))

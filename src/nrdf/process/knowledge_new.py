@@ -22,7 +22,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 PLACEHOLDER = "my-region"
 
 _PAD = {"name": "pad", "radius_mm": 25}
-_DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
+DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
     "sand": {
         "tool": {"name": "sanding disc", "radius_mm": 25},
         "overlap": 0.4, "edge_margin_mm": 10, "lead_deg": 3,
@@ -53,6 +53,7 @@ _DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
     },
     "custom": {"name": "what is done", "tool": _PAD, "overlap": 0.3, "feed_mm_s": 100},
 }  # fmt: skip
+"""What each kind of process begins with."""
 
 
 def new_knowledge(
@@ -97,7 +98,7 @@ def new_knowledge(
             "unit": None if cloud.unit else known,
         },
         "regions": [
-            {**row, "processes": [{"kind": kind, **_DEFAULTS[kind]}]}  # type: ignore[index]
+            {**row, "processes": [{"kind": kind, **DEFAULTS[kind]}]}  # type: ignore[index]
             for row, kind in zip(rows, every, strict=True)
         ],
     }

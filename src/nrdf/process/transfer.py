@@ -10,14 +10,16 @@ A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any n
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from nrdf.cloud import PointCloud, in_metres
-from nrdf.errors import ModelError, ProcessError
+from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.output import output_folder
 from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
@@ -31,6 +33,7 @@ from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
+from nrdf.regions.region import region_indices
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
@@ -114,14 +117,20 @@ class Teacher:
         target: PointCloud | Embedded,
         unit: str | None = None,
         min_confidence: float = MIN_CONFIDENCE,
+        marked: Mapping[str, ArrayLike] | None = None,
+        progress: Callable[[int, int], None] | None = None,
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
         target: in the category's orientation, or embedded in any pose, in metres. unit: of the
         target, where its file did not say. A region that is found nowhere, or with
         less mean confidence than `min_confidence`, is skipped; a process that does not fit its
-        region there is left out with the reason. Raises CloudError for a target that cannot be
-        used, ProcessError for one whose unit nothing tells.
+        region there is left out with the reason. marked: regions that a person has marked on the
+        target, by name, as `region_indices` takes them, points in metres; they are taken as they
+        are, and a mask that is False everywhere says that the region is not there. `progress` is
+        told (done, all) steps. Raises CloudError for a target that cannot be used, ProcessError
+        for one whose unit nothing tells, RegionError for a marked region that is not taught or
+        not on the target.
         """
         start = time.perf_counter()
         if isinstance(target, Embedded):
@@ -130,23 +139,45 @@ class Teacher:
             known = known_unit(target, unit, self.lesson.knowledge.category, "the target", "unit")
             embedded = self.model.embed(in_metres(target, known))
         matches = self.taught.retrieve_all(self.lesson.regions, embedded)
+        matches |= self._marked(marked or {}, matches, embedded.cloud)
         found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
         seconds = {"regions": time.perf_counter() - start}
         start = time.perf_counter()
         way = Correspondence(self.reference, embedded)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
-        paths = tuple(
-            self._path(name, number, process, found[name], way)
-            for name, number, process in self.steps()
-        )
+        steps, paths = self.steps(), []
+        for done, (name, number, process) in enumerate(steps):
+            if progress is not None:
+                progress(done + 1, len(steps) + 1)
+            paths.append(self._path(name, number, process, found[name], way))
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        return Transferred(self.lesson, with_normals(embedded), found, paths, warnings, seconds)
+        return Transferred(
+            self.lesson, with_normals(embedded), found, tuple(paths), warnings, seconds
+        )
+
+    def _marked(
+        self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
+    ) -> dict[str, Match]:
+        """Matches of regions that a person has marked on the target: nothing about them is in
+        doubt."""
+        matches = {}
+        for name, region in marked.items():
+            if name not in found:
+                raise RegionError(unknown_name("taught region", name, list(found)))
+            values = np.asarray(region)
+            try:
+                absent = values.dtype == bool and len(values) == len(target) and not values.any()
+                indices = np.arange(0) if absent else np.unique(region_indices(values, target))
+            except RegionError as error:
+                raise RegionError(f"region '{name}' on the target: {error}") from None
+            matches[name] = Match(indices, found[name].points, np.ones(len(indices)), "marked")
+        return matches
 
     def steps(self) -> list[tuple[str, int, Process]]:
         """Every process with its region and number there, in the order in which they are done."""
@@ -248,6 +279,8 @@ def working(embedded: Embedded, indices: np.ndarray) -> np.ndarray:
 def _missing(match: Match, min_confidence: float) -> str:
     if match.presence.reason:
         return f"{match.presence.reason} (confidence {match.presence.confidence:.2f})"
+    if not len(match.indices) and match.method == "marked":
+        return "marked as not there"
     if not len(match.indices):
         return "found nowhere on the target"
     if match.score < min_confidence:

@@ -25,7 +25,7 @@ class Match:
     points: (m, 3) where C puts each point of the reference's region, in its order, in the
         target's frame and unit (raw prediction, off the surface by the field's error).
     confidence: (k,) in [0, 1], for each of `indices`.
-    method: "mask" or "points".
+    method: "mask" or "points"; "marked" where a person has marked it on the target.
     presence: whether the target has the region and the scan shows it.
     """
 

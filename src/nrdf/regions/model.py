@@ -17,7 +17,7 @@ from nrdf.cloud import PointCloud, check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, oriented_features, snap, voters
 from nrdf.regions.embedded import Embedded, encoder_subset
 from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
@@ -218,6 +218,21 @@ class Taught:
         normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
 
+    def unlikeness(self, index: int, target: Embedded) -> np.ndarray:
+        """How far what each point of a target (n,) describes is from a point of the reference.
+
+        index: of the point in the reference's cloud; n: the target's working points, or the
+        reference's own. Descriptors of two shapes are compared by the places on the reference that
+        C finds for them, C(z_reference, θ(z_target, x)): canonical distances, in position and
+        weighted normal. Raises ModelError for a field without C.
+        """
+        own = int(self.reference.nearest_working[index])
+        k = self._describe(target.points, target.normals, target.z)
+        landed = self._invert(self.reference, k, target.normals)
+        there = oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
+        here = oriented_features(self.reference.points, self.reference.normals, NORMAL_WEIGHT)
+        return np.asarray(np.linalg.norm(there - here[own], axis=1))
+
     def _judged(
         self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
     ) -> Match:
@@ -278,15 +293,18 @@ class Taught:
         mask[reference.nearest_working[indices]] = True
         return mask
 
-    def _describe(self, points: np.ndarray, normals: np.ndarray) -> torch.Tensor:
-        model = self.model
+    def _describe(
+        self, points: np.ndarray, normals: np.ndarray, z: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """Descriptors (1, m, d_k) of points (m, 3), on the reference or on the shape of z."""
+        model, z = self.model, self.reference.z if z is None else z
         parts = []
         with torch.inference_mode():
             for start in range(0, len(points), _CHUNK):
                 part = slice(start, start + _CHUNK)
                 parts.append(
                     model.field.describe(
-                        self.reference.z,
+                        z,
                         model.tensor(points[part])[None],
                         model.tensor(normals[part])[None],
                     )

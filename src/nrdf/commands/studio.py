@@ -1,0 +1,68 @@
+"""`nrdf studio`: the browser application."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nrdf.commands.console import command_line, console, errors, versions
+
+
+def studio(
+    session: Path = Path("studio"),
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    no_browser: bool = False,
+    device: str = "cpu",
+) -> None:
+    """Paint regions, describe processes and see them on other objects, in a browser.
+
+    Prints an address and opens it. Everything done there is kept in the session's folder at once;
+    the same command goes on with it. Ctrl-C ends. Needs: pip install 'nrdf[studio]'.
+
+    Example: nrdf studio --session my-chairs
+
+    Args:
+        session: Folder that the session is kept in; made if missing.
+        host: Address to listen on. Whoever reaches it can use the studio, so by default only this
+            computer.
+        port: Port to listen on; the next free one where it is taken.
+        no_browser: Do not open a browser.
+        device: cpu, cuda, cuda:N or auto.
+    """
+    from nrdf.errors import OutputError
+
+    try:
+        import viser  # noqa: F401
+    except ImportError:
+        raise OutputError(
+            "the studio needs viser: pip install 'nrdf[studio]' (or pip install viser)"
+        ) from None
+    import nrdf
+    from nrdf.field.zoo import list_models
+    from nrdf.studio.app import Studio
+    from nrdf.studio.serving import LOOPBACK, open_server
+    from nrdf.studio.session import Session
+
+    kept = Session(session)
+    server = open_server(host, port)
+    origin = {"command": command_line(), "versions": versions()}
+    categories = [entry.category for entry in list_models()]
+    app = Studio(kept, server, lambda name: nrdf.load_model(name, device), categories, origin)
+    if host not in LOOPBACK:
+        errors.print(
+            f"listening on {host}: everyone who can reach this computer there can see and change "
+            "this session, and store files in its folder; there is no password",
+            style="yellow",
+        )
+    shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+    address = f"http://{shown}:{server.get_port()}"
+    console.print(f"{address}\nthe session is kept in {session}; Ctrl-C ends")
+    if not no_browser:
+        import webbrowser
+
+        webbrowser.open(address)
+    try:
+        server.sleep_forever()
+    finally:
+        app.worker.stop()
+        server.stop()

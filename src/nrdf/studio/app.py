@@ -1,0 +1,266 @@
+"""The page: a desk, a bench and a stage, brought together for everyone who has it open."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import viser
+
+from nrdf.errors import NrdfError
+from nrdf.studio.bench import Bench
+from nrdf.studio.body import REFERENCE
+from nrdf.studio.colours import COLOURINGS, likeness_colours
+from nrdf.studio.desk import Desk
+from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.studio.mouse import Mouse
+from nrdf.studio.panel import Panel
+from nrdf.studio.session import Session
+from nrdf.studio.stage import Figure, Stage
+from nrdf.studio.worker import Progress, Worker
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from nrdf.regions.model import Model
+
+log = logging.getLogger(__name__)
+
+_PLAN_AFTER_S = 0.4
+_ASPECT = 1.2  # width over height of a page that is not open yet
+_PATCH = 0.08  # first radius of a patch, in sides of the object
+
+
+class Studio:
+    """Everything between browsers and a session; all that are connected see the same.
+
+    server: a viser server with nothing on it yet. load: gives the model of a category, one of
+    `categories`. origin: what reports say of how they were made.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        server: viser.ViserServer,
+        load: Callable[[str], Model],
+        categories: Sequence[str],
+        origin: Mapping[str, Any],
+    ) -> None:
+        self.server, self.categories, self.origin = server, tuple(categories), origin
+        self.desk = Desk(session)
+        self.bench = Bench(self.desk, load)
+        self.stage = Stage(server)
+        self.lock = threading.RLock()
+        self.region, self.step, self.radius_m = "", 0, 0.05
+        self.colouring, self.width = COLOURINGS[0], 0.15
+        self.beside: str | None = None
+        """The one target that is shown beside the reference, None for all."""
+        self._likeness: dict[str, np.ndarray] = {}
+        self.mouse = Mouse(self)
+        self.panel = Panel(self)
+        self.worker = Worker(self.panel.started, self.panel.progress, self._ended)
+        server.on_client_connect(self._welcome)
+        self.restore()
+
+    # --- what is shown
+
+    def restore(self) -> None:
+        """Show the session from the beginning, and compute what it needs."""
+        with self.lock:
+            document = self.desk.document
+            self.worker.cancel()
+            self.stage.clear(1.0)
+            self.bench.results.clear()
+            self._likeness.clear()
+            self.mouse.forget()
+            self.region, self.step, self.beside = "", 0, None
+            self.sync()
+            if document.regions:
+                self.plan(0.0)
+            if any(region.mask.any() for region in document.regions) and document.targets:
+                self.transfer()
+
+    def sync(self) -> None:
+        """Bring stage and panel to what the document says."""
+        with self.lock:
+            document, keys = self.desk.document, self.desk.objects()
+            # Another reference, or none any more, is another stage.
+            standing = self.stage.figures.get(REFERENCE)
+            if standing is not None and (
+                REFERENCE not in keys or standing.body is not self.desk.body(REFERENCE)
+            ):
+                self.stage.clear(1.0)
+            if REFERENCE in keys and REFERENCE not in self.stage.figures:
+                body = self.desk.body(REFERENCE)
+                side = float((body.high - body.low).max())
+                self.stage.clear(1.0 / side)
+                self.radius_m = _PATCH * side
+            gone = [key for key in self.stage.figures if key not in keys]
+            new = [key for key in keys if key not in self.stage.figures]
+            for key in gone:
+                self.stage.remove(key)
+                self.bench.results.pop(key, None)
+            for key in new:
+                self.stage.add(key, self.desk.body(key))
+            painted = document.region(self.region)
+            if painted is None:
+                painted = document.regions[-1] if document.regions else None
+                self.region, self.step = ("" if painted is None else painted.name), 0
+            self.step = min(self.step, len(painted.steps) - 1) if painted else 0
+            if gone or new:
+                self.arrange()
+            self.mouse.grip()
+            self.draw()
+            self.panel.refresh()
+
+    def shown(self) -> list[str]:
+        """The objects that are to be seen."""
+        keys = self.desk.objects()
+        return [k for k in keys if k == REFERENCE or self.beside is None or k == self.beside]
+
+    def arrange(self) -> None:
+        """Let what is to be seen stand side by side, and every camera see all of it."""
+        shown = self.shown()
+        self.stage.arrange(shown)
+        place, middle = self.stage.camera(shown, _ASPECT)
+        initial = self.server.initial_camera
+        initial.position, initial.look_at = tuple(place), tuple(middle)
+        for client in self.server.get_clients().values():
+            place, middle = self.stage.camera(shown, client.camera.aspect)
+            with client.atomic():
+                client.camera.position = place
+                client.camera.look_at = middle
+
+    def draw(self) -> None:
+        """Colours, lines, names and the arrow, of all objects."""
+        with self.lock, self.server.atomic():
+            for key, figure in self.stage.figures.items():
+                self.draw_colours(figure)
+                lines = {} if self._alike(figure) else lines_of(self.desk, self.bench, key)
+                figure.draw_lines(lines)
+                figure.name(title_of(self.desk, self.bench, key))
+            if REFERENCE in self.stage.figures:
+                ends = direction_of(self.desk, self.region, self.step)
+                self.stage.figures[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
+
+    def draw_colours(self, figure: Figure) -> None:
+        """The colours of one object."""
+        if self._alike(figure):
+            figure.paint(likeness_colours(self._likeness[figure.key], self.width))
+        else:
+            by_confidence = self.colouring == "confidence"
+            figure.paint(colours_of(self.desk, self.bench, figure.key, by_confidence))
+
+    def recolour(self, colouring: str, width: float) -> None:
+        """Colour by something else, or another width of likeness.
+
+        Raises NrdfError for likeness where no point has been asked for.
+        """
+        with self.lock:
+            if colouring == "likeness" and not self._likeness:
+                raise NrdfError("take 'Alike' and click a point of the reference first")
+            self.colouring, self.width = colouring, width
+            self.draw()
+
+    def _alike(self, figure: Figure) -> bool:
+        return self.colouring == "likeness" and figure.key in self._likeness
+
+    def painted(self) -> None:
+        """What follows a change of regions: lines that no longer hold go, and new ones come."""
+        if self.colouring == "likeness":
+            self.colouring = COLOURINGS[0]
+        self.draw()
+        self.panel.refresh()
+        self.plan()
+        current = self.bench.is_current
+        if any(t.corrected and not current(t.object.name) for t in self.desk.document.targets):
+            self.transfer(_PLAN_AFTER_S)
+
+    # --- long work
+
+    def plan(self, delay_s: float = _PLAN_AFTER_S) -> None:
+        """Plan on the reference what is not planned yet, in the background."""
+        document = self.desk.document
+        self._later("plan", "planning on the reference", delay_s,
+                    lambda progress: self.bench.make_plans(document, progress))  # fmt: skip
+
+    def transfer(self, delay_s: float = 0.0) -> None:
+        """Bring the processes to the targets, in the background."""
+        document = self.desk.document
+        self._later("transfer", "finding regions and planning tool paths", delay_s,
+                    lambda progress: self.bench.transfer(document, progress))  # fmt: skip
+
+    def compare(self, key: str, index: int) -> None:
+        """Colour every object by how alike its points are to a shown point of the reference."""
+        if key != REFERENCE:
+            raise NrdfError("click a point of the reference: what is like it lights up elsewhere")
+        document = self.desk.document
+
+        def work(progress: Progress) -> None:
+            keys = [k for k in self.desk.objects() if k == REFERENCE or k in self.bench.results]
+            likeness = {}
+            for done, other in enumerate(keys):
+                progress(done, len(keys))
+                likeness[other] = self.bench.unlikeness(document, index, other)
+            self._likeness, self.colouring = likeness, "likeness"
+
+        self._later("likeness", "comparing descriptors", 0.0, work)
+
+    def _later(
+        self, kind: str, what: str, delay_s: float, work: Callable[[Progress], None]
+    ) -> None:
+        """Work in the background, then show what it has made, however it ended."""
+
+        def then_show(progress: Progress) -> None:
+            try:
+                work(progress)
+            finally:
+                with self.lock:
+                    self.draw()
+                    self.panel.refresh()
+
+        self.worker.submit(kind, what, then_show, delay_s)
+
+    def _ended(self, what: str, error: str) -> None:
+        self.panel.ended()
+        if error == "cancelled":
+            self.tell(what, "cancelled; what was finished is kept", bad=False)
+        elif error:
+            self.tell(what, error)
+
+    # --- talking
+
+    def need_region(self) -> None:
+        """Raises NrdfError where there is no region to work on."""
+        if self.desk.document.region(self.region) is None:
+            raise NrdfError("there is no region yet: press 'New region' in step 2 first")
+
+    @contextmanager
+    def answering(self) -> Iterator[None]:
+        """A block that holds the lock; what goes wrong in it is said on the page."""
+        with self.lock:
+            try:
+                yield
+            except NrdfError as error:
+                self.panel.refresh()
+                self.tell("That did not work", str(error))
+            except Exception as error:
+                log.exception("a fault of the studio")
+                self.tell("A fault of nrdf", f"{type(error).__name__}: {error}")
+
+    def tell(self, title: str, body: str, bad: bool = True) -> None:
+        """A notification on every open page."""
+        for client in self.server.get_clients().values():
+            client.add_notification(
+                title, body, color="red" if bad else "teal", auto_close_seconds=15 if bad else 6
+            )
+
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        session = self.desk.session
+        if session.restored and self.desk.document.reference is not None:
+            said = f"as you left it, from the folder {session.folder.name}"
+            client.add_notification("Your session is here", said, auto_close_seconds=8)

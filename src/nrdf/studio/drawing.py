@@ -1,0 +1,100 @@
+"""What an object looks like: its points' colours, the lines on it, and what stands above it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nrdf.process.job_folder import panel_of
+from nrdf.studio.bench import Bench
+from nrdf.studio.body import REFERENCE
+from nrdf.studio.colours import confidence_colours, painted_colours
+from nrdf.studio.desk import Desk
+
+_DEEP, _PALE = 0.5, 0.62
+"""Shares of a region's colour in the lines on it, and in the region where there are lines."""
+
+
+def found(bench: Bench, key: str, region: str) -> np.ndarray | None:
+    """Indices (k,) of a target's points that were found to be in a region, None where none were."""
+    result = bench.results.get(key)
+    if result is None or region not in result.transferred.regions:
+        return None
+    region_there = result.transferred.regions[region]
+    return None if region_there.missing else region_there.match.indices
+
+
+def colours_of(desk: Desk, bench: Bench, key: str, by_confidence: bool = False) -> np.ndarray:
+    """Colours (k, 3) uint8 of an object's shown points by their regions; a target's also by their
+    confidence, which is all there is to see `by_confidence`."""
+    body, target = desk.body(key), desk.target(key)
+    drawn: list[tuple[tuple[int, int, int], np.ndarray, np.ndarray | None]] = []
+    for region in desk.document.regions:
+        there = found(bench, key, region.name)
+        corrected = target is not None and region.name in target.corrected
+        confidence = None
+        if target is not None and not corrected:
+            if there is None:
+                continue
+            match = bench.results[key].transferred.regions[region.name].match
+            everywhere = np.zeros(len(body.cloud))
+            everywhere[there] = match.confidence
+            confidence = body.to_shown(everywhere)
+        indices = np.flatnonzero(desk.mask(key, region.name, there))
+        own = None if confidence is None else confidence[indices]
+        drawn.append((region.colour, indices, own))
+    count = len(body.points)
+    if by_confidence and target is not None:
+        sure = [(i, np.ones(len(i)) if c is None else c) for _, i, c in drawn]
+        return confidence_colours(count, sure)
+    return painted_colours(count, [(_pale(c), i, s) for c, i, s in drawn])
+
+
+def lines_of(
+    desk: Desk, bench: Bench, key: str
+) -> dict[str, tuple[Sequence[np.ndarray], np.ndarray]]:
+    """The lines on an object's regions: name to places, each (m, 3), m, and a colour (3,)."""
+    colours = {r.name: _DEEP * np.array(r.colour) for r in desk.document.regions}
+    if key != REFERENCE:
+        result = bench.results.get(key)
+        drawn = {} if result is None else panel_of(result.transferred, key).lines
+        return {name: (parts, colours[name]) for name, parts in drawn.items() if name in colours}
+    lines: dict[str, tuple[Sequence[np.ndarray], np.ndarray]] = {}
+    for region in desk.document.regions:
+        parts = bench.planned(region)
+        if parts:
+            lines[region.name] = (parts, colours[region.name])
+    return lines
+
+
+def title_of(desk: Desk, bench: Bench, key: str) -> str:
+    """What stands above an object: its name, and what a person should look at."""
+    if key == REFERENCE:
+        reference = desk.document.reference
+        return "" if reference is None else f"{reference.name}, taught here"
+    result = bench.results.get(key)
+    if result is None or not result.doubtful:
+        return key
+    return f"{key}: look at {', '.join(result.doubtful)}"
+
+
+def direction_of(desk: Desk, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Ends, each (3,), m, of the arrow along a step's lines on the reference, None for no arrow."""
+    painted = desk.document.region(region)
+    if painted is None or not painted.mask.any():
+        return None
+    direction = painted.steps[step].get("direction")
+    if direction is None or not np.linalg.norm(direction) > 0:
+        return None
+    body = desk.body(REFERENCE)
+    points = body.points[painted.mask]
+    middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+    along = np.asarray(direction, np.float64) / np.linalg.norm(direction)
+    half = 0.1 * float((body.high - body.low).max()) * along
+    return middle - half, middle + half
+
+
+def _pale(colour: tuple[int, int, int]) -> tuple[int, int, int]:
+    r, g, b = (round(_PALE * c + (1 - _PALE) * 255) for c in colour)
+    return (r, g, b)

@@ -1,0 +1,92 @@
+"""What leaves the studio: knowledge, jobs, pictures, pages and robot programs, as the command line
+writes them."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.export.registry import export_job
+from nrdf.output import output_folder
+from nrdf.picture import Panel, draw_regions
+from nrdf.process.job_folder import job_of, panel_of, write_transfer
+from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.limits import Limits
+from nrdf.studio.bench import Bench, Result
+from nrdf.studio.body import REFERENCE
+from nrdf.studio.desk import Desk
+from nrdf.studio.teaching import knowledge_of
+
+SAVED = "saved"
+
+
+def save_knowledge(desk: Desk) -> Path:
+    """The knowledge file, explained, with the reference's cloud beside it; their folder.
+
+    Raises ProcessError for knowledge that is not complete.
+    """
+    knowledge, document = knowledge_of(desk.session, desk.document), desk.document
+    assert document.reference is not None  # else there is no knowledge
+    place = _place(desk, "knowledge")
+    with output_folder(place, overwrite=True) as folder:
+        file = f"{knowledge.category}.yaml"
+        write_knowledge(folder / file, knowledge, explained=True)
+        shutil.copyfile(desk.session.path_of(document.reference), folder / document.reference.file)
+    return place
+
+
+def save_job(desk: Desk, name: str, result: Result, origin: Mapping[str, Any]) -> Path:
+    """A target's job, as `nrdf transfer` writes it; its folder."""
+    place = _place(desk, name, "job")
+    with output_folder(place, overwrite=True) as folder:
+        write_transfer(folder, result.transferred, Limits(), name, origin)
+    return place
+
+
+def save_programs(desk: Desk, name: str, result: Result, formats: Sequence[str]) -> Path:
+    """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
+    place = _place(desk, name, "programs")
+    with output_folder(place, overwrite=True) as folder:
+        export_job(job_of(result.transferred), formats, folder)
+    return place
+
+
+def save_picture(desk: Desk, bench: Bench) -> Path:
+    """The reference and the targets side by side; the picture's file."""
+    document = desk.document
+    if document.reference is None:
+        raise ProcessError("there is nothing to draw: load a reference in step 1")
+    lines = {region.name: bench.planned(region) for region in document.regions}
+    body = desk.body(REFERENCE)
+    regions = {r.name: np.flatnonzero(r.mask) for r in document.regions}
+    panels = [Panel(document.reference.name, body.points, body.normals, regions, "taught", lines)]
+    for target in document.targets:
+        result = bench.results.get(target.object.name)
+        if result is not None:
+            panels.append(panel_of(result.transferred, target.object.name))
+    place = _place(desk, "picture.png")
+    place.parent.mkdir(parents=True, exist_ok=True)
+    draw_regions(panels, place)
+    return place
+
+
+def zipped(folder: Path) -> bytes:
+    """All files of a folder as a ZIP archive."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                archive.write(path, Path(folder.name) / path.relative_to(folder))
+    return buffer.getvalue()
+
+
+def _place(desk: Desk, *parts: str) -> Path:
+    # Names of targets have no separators: `Desk.add_target` sees to it.
+    return desk.session.folder.joinpath(SAVED, *parts)

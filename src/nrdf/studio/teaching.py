@@ -1,0 +1,130 @@
+"""From what was painted and filled in to process knowledge, by the knowledge file's own rules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.process.knowledge import Knowledge, Process, Trajectory
+from nrdf.process.knowledge_file import validated
+from nrdf.process.knowledge_new import DEFAULTS
+from nrdf.process.lesson import Lesson, bind, checksum
+from nrdf.studio.session import CLOUDS, Document, Painted, Session
+from nrdf.units import OTHER_UNITS, to_si
+
+PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")
+NUMBERS = (
+    "stepover_mm", "spacing_mm", "edge_margin_mm", "passes", "force_n", "force_tolerance_n",
+    "feed_mm_s", "lead_deg", "tilt_deg", "standoff_mm", "spindle_rpm",
+)  # fmt: skip
+"""The numbers of a process that the page asks for, by their names in a knowledge file."""
+_OPTIONAL = ("force_n", "force_tolerance_n", "spindle_rpm")  # 0 on the page: there is none
+ORIGIN = "the studio"
+
+
+def new_step(kind: str) -> dict[str, Any]:
+    """A process of a kind with the values that `nrdf knowledge new` gives it."""
+    content = {"kind": kind, **DEFAULTS[kind]}  # type: ignore[index]
+    return plain_step(Process.model_validate(content))
+
+
+def plain_step(process: Process) -> dict[str, Any]:
+    """A process as a knowledge file holds it, SI, its stepover given as such."""
+    content = process.model_dump(mode="json", exclude_defaults=True)
+    if process.trajectory != "taught":
+        content.pop("overlap", None)
+        content["stepover_m"] = process.distance_between_lines_m
+    return content
+
+
+def shown_numbers(step: Mapping[str, Any]) -> dict[str, float]:
+    """The numbers of a step as the page shows them, by the names of `NUMBERS`."""
+    defaults = {"spacing_m": 0.01, "passes": 1}
+    shown = {}
+    for name in NUMBERS:
+        si, factor = _si(name)
+        value = step.get(si, defaults.get(si, 0.0))
+        shown[name] = float(f"{value / factor:.6g}")
+    return shown
+
+
+def changed_step(step: Mapping[str, Any], shown: Mapping[str, float]) -> dict[str, Any]:
+    """The step with numbers as the page shows them."""
+    content = dict(step)
+    for name, value in shown.items():
+        si, _ = _si(name)
+        if name in _OPTIONAL and value == 0:
+            content.pop(si, None)
+        else:
+            number = int(value) if name == "passes" else float(value)
+            content |= to_si({name: number}, [si])
+    return content
+
+
+def process_of(region: Painted, number: int) -> Process:
+    """One step of a region. Raises ProcessError naming region, field and value."""
+    content = _content("chair", {"points_m": [(0.0, 0.0, 0.0)]}, (region,))
+    return validated(content, ORIGIN).regions[0].processes[number]
+
+
+def knowledge_of(session: Session, document: Document) -> Knowledge:
+    """The document as process knowledge, whose file belongs into the folder of the clouds.
+
+    Raises ProcessError for a document without reference or regions, and as `validated` does.
+    """
+    if document.reference is None:
+        raise ProcessError("there is no reference yet: load one in step 1")
+    drawn = tuple(region for region in document.regions if region.mask.any())
+    if not drawn:
+        raise ProcessError("no region is painted yet: paint one in step 2")
+    path = session.path_of(document.reference)
+    reference = {"cloud": document.reference.file, "sha256": checksum(path)}
+    return validated(
+        {"allow_overlap": document.allow_overlap, **_content(document.category, reference, drawn)},
+        ORIGIN,
+    )
+
+
+def lesson_of(session: Session, document: Document) -> Lesson:
+    """The document as knowledge on its reference. Raises ProcessError as `knowledge_of` and
+    `nrdf.process.lesson.bind` do."""
+    return bind(knowledge_of(session, document), session.folder / CLOUDS, ORIGIN)
+
+
+def _content(
+    category: str, reference: Mapping[str, Any], regions: tuple[Painted, ...]
+) -> dict[str, Any]:
+    return {
+        "category": category,
+        "reference": dict(reference),
+        "regions": [
+            {
+                "name": region.name,
+                "indices": np.flatnonzero(region.mask).tolist(),
+                "processes": [dict(step) for step in region.steps],
+            }
+            for region in regions
+        ],
+    }
+
+
+def painted_of(lesson: Lesson, colours: Mapping[str, tuple[int, int, int]]) -> tuple[Painted, ...]:
+    """A lesson's regions and steps, to be changed on the page."""
+    painted = []
+    for region in lesson.knowledge.regions:
+        mask = np.zeros(len(lesson.cloud), bool)
+        mask[lesson.regions[region.name]] = True
+        steps = tuple(plain_step(process) for process in region.processes)
+        painted.append(Painted(region.name, colours[region.name], mask, steps))
+    return tuple(painted)
+
+
+def _si(name: str) -> tuple[str, float]:
+    """The SI name of a field in a file's unit, and the factor to it."""
+    for other, (si, factor) in OTHER_UNITS.items():
+        if name.endswith(other):
+            return name.removesuffix(other) + si, factor
+    return name, 1.0

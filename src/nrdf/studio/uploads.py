@@ -1,0 +1,74 @@
+"""Files that a browser sends, and objects that come with the package, as clouds in metres."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path, PurePath
+
+import numpy as np
+
+from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
+from nrdf.cloud import PointCloud, check_cloud, in_metres, read_cloud
+from nrdf.errors import CloudError, NrdfError
+from nrdf.geometry import thin
+from nrdf.process.lesson import known_unit
+from nrdf.regions.model import MINIMUM_POINTS, WORKING_POINTS
+
+LARGEST_UPLOAD = 128 << 20
+ENDINGS = (
+    ".ply", ".pcd", ".xyz", ".xyzn", ".txt", ".csv", ".asc", ".pts", ".npy", ".npz",
+    ".off", ".obj", ".stl", ".glb",
+)  # fmt: skip
+BUNDLED = (REFERENCE, *TARGETS)
+_LONGEST_NAME = 60
+
+
+def read_upload(name: str, content: bytes, category: str, unit: str | None = None) -> PointCloud:
+    """The cloud, in metres, of a file that a browser sent.
+
+    The name serves for messages, and its ending for telling the format; it is no path. unit: where
+    the file does not say it. Raises CloudError for a file that is too large, of another type, or
+    that `nrdf.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
+    """
+    shown = shown_name(name)
+    ending = PurePath(shown).suffix.lower()
+    if ending not in ENDINGS:
+        raise CloudError(
+            f"{shown} is no point cloud or mesh: the name must end with one of {', '.join(ENDINGS)}"
+        )
+    if len(content) > LARGEST_UPLOAD:
+        raise CloudError(
+            f"{shown} has {len(content) / 2**20:.0f} MiB; at most {LARGEST_UPLOAD >> 20} MiB are "
+            "taken: thin it out, or use the command line, which has no limit"
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"upload{ending}"
+        path.write_bytes(content)
+        try:
+            cloud = read_cloud(path)
+            check_cloud(cloud, MINIMUM_POINTS)
+        except NrdfError as error:
+            raise type(error)(str(error).replace(str(path), shown)) from None
+    return in_metres(cloud, known_unit(cloud, unit, category, shown, "the unit"))
+
+
+def bundled(name: str) -> PointCloud:
+    """A chair that comes with the package."""
+    return bundled_chair(name)[0]
+
+
+def to_paint_on(cloud: PointCloud) -> PointCloud:
+    """A reference as a model works with it: the same points that it would keep."""
+    if len(cloud) <= WORKING_POINTS:
+        return cloud
+    return cloud.select(thin(cloud.points, WORKING_POINTS, np.random.default_rng(0)))
+
+
+def shown_name(name: str) -> str:
+    """A file's name as it may be shown: the last part of a path, printable, not too long."""
+    last = name.replace("\\", "/").rpartition("/")[2]
+    printable = "".join(c for c in last if c.isprintable()).strip()
+    if len(printable) > _LONGEST_NAME:
+        ending = PurePath(printable).suffix[:8]
+        printable = printable[: _LONGEST_NAME - len(ending) - 1] + "…" + ending
+    return printable or "file"

@@ -1,0 +1,57 @@
+"""Draw docs/studio.png: the studio with the bundled chair's processes, brought to another chair.
+
+    python tools/studio_picture.py CHROMIUM
+
+CHROMIUM: path of a Chromium browser. Needs `pip install -e '.[dev]'`.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+import nrdf
+from nrdf.bundled import KNOWLEDGE, REFERENCE, TARGETS
+from nrdf.process.lesson import read_lesson
+from nrdf.studio.app import Studio
+from nrdf.studio.serving import open_server
+from nrdf.studio.session import Session
+from nrdf.studio.uploads import bundled
+
+PICTURE = Path(__file__).parents[1] / "docs" / "studio.png"
+FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
+         "--enable-unsafe-swiftshader")  # fmt: skip
+SIZE = {"width": 1500, "height": 900}
+
+
+def main() -> None:
+    """Set the studio up, open it and take the picture."""
+    server = open_server("127.0.0.1", 8490)
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        studio = Studio(Session(folder), server, nrdf.load_model, ["chair"], {})
+        studio.desk.open_lesson(REFERENCE, read_lesson(KNOWLEDGE))
+        studio.desk.add_target(TARGETS[2], bundled(TARGETS[2]))
+        studio.restore()
+        studio.worker.wait(300)
+        browser = playwright.chromium.launch(executable_path=sys.argv[1], args=list(FLAGS))
+        page = browser.new_page(viewport=SIZE)
+        page.set_default_timeout(120e3)
+        page.goto(f"http://127.0.0.1:{server.get_port()}")
+        page.get_by_role("tab", name="4 Targets").click()
+        page.get_by_text("Software WebGL").wait_for()
+        for close in page.locator(".mantine-Notification-closeButton").all():
+            close.click()
+        studio.arrange()
+        time.sleep(5)
+        page.screenshot(path=PICTURE)
+        browser.close()
+        studio.worker.stop()
+    server.stop()
+
+
+if __name__ == "__main__":
+    main()
