@@ -21,7 +21,7 @@ def test_a_unit_is_guessed_from_the_usual_size(size, category, unit):
 
 def test_no_unit_fits_or_nothing_is_known_of_the_category():
     found = find_unit(None, 1e-6, "chair")
-    assert found.name is None and "in no unit is it 0.45 to 1.6 m" in found.doubt
+    assert found.name is None and "in none is it 0.45 to 1.6 m long, as a chair" in found.doubt
     assert find_unit(None, 1.0, "teapot").origin == "unknown"
 
 

@@ -143,6 +143,8 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "probability": round(best.probability, 4),
         "cost": round(best.cost, 4),
         "usual_cost": round(found.judge.usual_cost, 4),
+        "strangeness": round(found.strangeness, 3),
+        "fits": found.fits,
         "doubts": found.doubts,
         "unit": {"name": unit.name, "origin": unit.origin},
         "sensors": None if sensors is None else sensors,

@@ -35,6 +35,9 @@ METHODS = ("mask", "points")
 WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
+FARTHEST = 0.1
+"""A target point farther than this from all mapped reference points, in position and weighted
+normal, canonical, has no counterpart on the reference and belongs to no region."""
 _CHUNK = 8192  # points described or inverted at a time
 # Chosen on unseen family chairs, so that confidence is about the share of points that are right.
 _DISTANCE_SCALE = 0.4  # canonical distance to the mapped point at which trust has fallen to 1/e
@@ -251,12 +254,13 @@ class Taught:
             mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
         )
         trust = mapped.trust[asked] * np.exp(-distance / _DISTANCE_SCALE)
+        near = distance[:, 0] < FARTHEST
         matches = {}
         for name, indices in chosen.items():
             member = self._working_mask(indices)[asked]
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
-            index, follows = target.to_all(votes > 0.5)
+            index, follows = target.to_all((votes > 0.5) & near)
             whole = self.reference.is_whole
             arrived = mapped.points[indices] if whole else self.map_points(indices, target).points
             matches[name] = Match(

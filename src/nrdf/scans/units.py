@@ -13,8 +13,8 @@ _FAR = 3.0  # times outside of the usual sizes from which a unit that was given 
 
 @dataclass(frozen=True)
 class Unit:
-    """name: one of `METRES`, None if unknown. origin: "given", "guessed" or "unknown". doubt: why
-    it may be wrong, "" if nothing speaks against it."""
+    """name: one of `METRES`, None if unknown. origin: "given", "guessed" or "unknown". doubt: what
+    speaks against it, "" if nothing does."""
 
     name: str | None
     origin: str
@@ -36,9 +36,11 @@ def find_unit(given: str | None, longest_side: float, category: str) -> Unit:
     if given is None:
         if fitting:
             return Unit(fitting[0], "guessed")
-        return Unit(None, "unknown", f"in no unit is it {range_} long, as a {category} usually is")
+        doubt = f"the unit is unknown: in none is it {range_} long, as a {category} usually is"
+        return Unit(None, "unknown", doubt)
     size = longest_side * METRES[given]
     if low / _FAR <= size <= high * _FAR:
         return Unit(given, "given")
     hint = f"; in {fitting[0]} it would be" if fitting else ""
-    return Unit(given, "given", f"{size:.3g} m is not the {range_} of a usual {category}{hint}")
+    doubt = f"the unit may be wrong: {size:.3g} m is not the {range_} of a usual {category}{hint}"
+    return Unit(given, "given", doubt)
