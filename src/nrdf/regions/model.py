@@ -166,12 +166,12 @@ class Model:
         seconds["embed"] = time.perf_counter() - start
         return Embedded(cloud, working, points, normals, pose, z, seconds)
 
-    def set_reference(self, reference: PointCloud) -> Taught:
+    def set_reference(self, reference: PointCloud, pose: Similarity | None = None) -> Taught:
         """Embed a reference and describe its surface once, for any number of targets.
 
-        Raises CloudError as `embed` does.
+        `pose` and errors as for `embed`.
         """
-        return Taught(self, self.embed(reference))
+        return Taught(self, self.embed(reference, pose))
 
     def tensor(self, values: np.ndarray) -> torch.Tensor:
         """Values of any shape on the model's device, in single precision."""

@@ -161,8 +161,8 @@ def _objects(points: np.ndarray, up: np.ndarray | None) -> tuple[np.ndarray, np.
 def _with_what_is_above(
     places: np.ndarray, label: np.ndarray, up: np.ndarray, gap: float
 ) -> np.ndarray:
-    """Labels (n,) in which the largest object has taken over those that are mostly within its
-    outline, seen along `up` (3,)."""
+    """Labels (n,) in which the largest object has taken over those that reach into its outline,
+    seen along `up` (3,)."""
     axes = np.linalg.svd(up[None])[2][1:]
     flat = places @ axes.T
     while True:
@@ -173,7 +173,7 @@ def _with_what_is_above(
             return label
         hull = ConvexHull(own, qhull_options="QJ")
         outside = flat @ hull.equations[:, :2].T + hull.equations[:, 2]
-        within = np.bincount(label, outside.max(axis=1) < gap, len(sizes)) > 0.5 * sizes
+        within = np.bincount(label, outside.max(axis=1) < gap, len(sizes)) > 0
         within[largest] = False
         if not within.any():
             return label
