@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,6 +20,7 @@ from nrdf.commands.console import (
 )
 
 if TYPE_CHECKING:
+    from nrdf.cloud import PointCloud
     from nrdf.picture import Panel
     from nrdf.regions.model import Model
     from nrdf.scans.target import AlignedScan
@@ -40,6 +41,7 @@ def align(
     unit: Unit | None = None,
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
+    reference: tuple[Path, ...] = (),
     device: str = "cpu",
     strict: bool = False,
     overwrite: bool = False,
@@ -65,6 +67,8 @@ def align(
         unit: Unit of the scan; what its file says, or what is usual for the category, unless given.
         skip: Steps of cleaning to leave out.
         topic: What to read of a ROS 2 bag that has clouds under several topics.
+        reference: Examples of the category, +X forward and +Y up, to align by instead of members of
+            its parametric family; needed for a category that has none.
         device: cpu, cuda, cuda:N or auto.
         strict: End with 3 where there is any doubt: an ambiguous pose, a poor fit, several objects,
             an unlikely unit.
@@ -78,7 +82,8 @@ def align(
         from nrdf.picture import draw_regions
 
         loaded = nrdf.load_model(model, device)
-        found = read_scan(loaded, scan, up, sensor, unit, skip, topic)
+        examples = [nrdf.read_cloud(path) for path in reference]
+        found = read_scan(loaded, scan, examples, up, sensor, unit, skip, topic)
         best, cleaned = found.alignment.best, found.cleaned
         points = best.pose.to_canonical(cleaned.cloud.points)
         nrdf.write_cloud(folder / "aligned.ply", PointCloud(points, frame=loaded.category))
@@ -100,6 +105,7 @@ def align(
 def read_scan(
     model: Model,
     path: Path,
+    examples: Sequence[PointCloud],
     up: str,
     sensor: tuple[float, ...] = (),
     unit: str | None = None,
@@ -108,7 +114,8 @@ def read_scan(
 ) -> AlignedScan:
     """Read, clean and align a scan by a command's options; every doubt is a warning.
 
-    Raises CloudError for options without sense, an unreadable scan, or one without an object.
+    `examples` of the category stand in for members of its family where there are any. Raises
+    CloudError for options without sense, an unreadable scan, or one without an object.
     """
     import numpy as np
 
@@ -125,7 +132,7 @@ def read_scan(
     places = np.array(sensor, float).reshape(-1, 3) if sensor else None
     direction = None if up == "auto" else up_axis(up)
     cloud = read_cloud(path, topic=topic)
-    found = bring_in(Judge(model), cloud, direction, places, unit, skip)
+    found = bring_in(Judge(model, examples), cloud, direction, places, unit, skip)
     for doubt in found.doubts:
         log.warning("%s: %s", path, doubt)
     return found

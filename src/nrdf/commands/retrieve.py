@@ -100,7 +100,10 @@ def retrieve(
                 raise CloudError("--sensor, --unit, --skip and --strict are for scans: give --up")
             target_cloud = nrdf.read_cloud(target, topic=topic)
         else:
-            scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+            from nrdf.shapes.families import FAMILY_NAMES
+
+            examples = [] if loaded.category in FAMILY_NAMES else [reference_cloud]
+            scan = read_scan(loaded, target, examples, up, sensor, unit, skip, topic)
             target_cloud, doubts = scan.scan, scan.doubts
         regions = read_regions(region)
         clock.lap("read files")
