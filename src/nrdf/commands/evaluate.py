@@ -25,13 +25,15 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score methods: on scans (bsrc), on exact truth (families), on the shapes themselves (shape).
+    """Score methods: on the benchmark (bsrc), on exact truth (families), on the shapes themselves
+    (shape), on scans in any pose (scans).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
+    from nrdf.commands.evaluate_scans import scans
     from nrdf.commands.evaluate_shape import shape
 
-    return {"bsrc": bsrc, "families": families, "shape": shape}
+    return {"bsrc": bsrc, "families": families, "shape": shape, "scans": scans}
 
 
 def bsrc(
