@@ -26,7 +26,9 @@ if TYPE_CHECKING:
         RegionError,
         TrainingError,
     )
-    from nrdf.regions.model import Match, Model, Taught
+    from nrdf.regions.match import Match
+    from nrdf.regions.model import Model, Taught
+    from nrdf.scans.target import align
 
 __all__ = [
     "CloudError",
@@ -42,6 +44,7 @@ __all__ = [
     "Taught",
     "TrainingError",
     "__version__",
+    "align",
     "load_model",
     "read_cloud",
     "write_cloud",
@@ -52,6 +55,7 @@ __version__ = "0.1.0"
 _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
     **dict.fromkeys(("Match", "Model", "Taught"), "nrdf.regions.model"),
+    "align": "nrdf.scans.target",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
 

@@ -119,20 +119,16 @@ def read_scan(
     """
     import numpy as np
 
-    from nrdf.cloud import read_cloud
+    import nrdf
     from nrdf.errors import CloudError
-    from nrdf.scans.judge import Judge
-    from nrdf.scans.target import bring_in
-    from nrdf.similarity import up_axis
 
     if len(sensor) % 3:
         raise CloudError(
             f"--sensor has {len(sensor)} numbers; three are needed for each sensor: x y z"
         )
     places = np.array(sensor, float).reshape(-1, 3) if sensor else None
-    direction = None if up == "auto" else up_axis(up)
-    cloud = read_cloud(path, topic=topic)
-    found = bring_in(Judge(model, examples), cloud, direction, places, unit, skip)
+    cloud = nrdf.read_cloud(path, topic=topic)
+    found = nrdf.align(model, cloud, up, places, unit, skip, examples)
     for doubt in found.doubts:
         log.warning("%s: %s", path, doubt)
     return found

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nrdf.cloud import PointCloud
-from nrdf.regions.model import Embedded, Match
+from nrdf.regions.match import Match
+from nrdf.regions.model import Embedded, Model
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
 from nrdf.scans.units import Unit, find_unit
+from nrdf.similarity import Similarity, up_axis
 
 # On the test shapes, whole and in single views, these tell chairs, cars and aircraft apart.
 _FOREIGN = 0.5  # cost above the usual one from which an object is not of the category
@@ -30,6 +32,11 @@ class AlignedScan:
     alignment: Alignment
     unit: Unit
 
+    @property
+    def pose(self) -> Similarity:
+        """The likeliest pose: from canonical coordinates to the scan's."""
+        return self.alignment.best.pose
+
     def embed(self) -> Embedded:
         """The object as the model's field sees it, in the likeliest pose."""
         best = self.alignment.best
@@ -42,8 +49,7 @@ class AlignedScan:
     @property
     def strangeness(self) -> float:
         """How far the object's proportions are from the category's, in standard deviations."""
-        pose = self.alignment.best.pose
-        return self.judge.strangeness(pose.to_canonical(self.cleaned.cloud.points))
+        return self.judge.strangeness(self.pose.to_canonical(self.cleaned.cloud.points))
 
     @property
     def fits(self) -> bool:
@@ -78,6 +84,29 @@ class AlignedScan:
         if self.unit.doubt:
             found.append(self.unit.doubt)
         return found
+
+
+def align(
+    model: Model,
+    scan: PointCloud,
+    up: str = "auto",
+    sensors: np.ndarray | None = None,
+    unit: str | None = None,
+    skip: Sequence[str] = (),
+    examples: Sequence[PointCloud] = (),
+) -> AlignedScan:
+    """Clean a scan of one object in any pose, and align it with the model's category.
+
+    up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
+    stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
+    leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
+    the category's family. For many scans, make one `Judge` and use `bring_in`.
+
+    Raises CloudError for a direction or step that is not known and where no object is left,
+    ModelError for a category without a family and no examples.
+    """
+    direction = None if up == "auto" else up_axis(up)
+    return bring_in(Judge(model, examples), scan, direction, sensors, unit, skip)
 
 
 def bring_in(
