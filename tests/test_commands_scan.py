@@ -57,7 +57,7 @@ def test_align_writes_pose_object_and_picture(files, tmp_path, capsys):
     found = similarity(report)
     assert yaw_error(found, PLACE) < 5 and found.scale == pytest.approx(850, rel=0.03)
     assert report["unit"] == {"name": "mm", "origin": "guessed"} and report["doubts"] == []
-    assert [step["name"] for step in report["cleaning"]][:2] == ["duplicates", "floor"]
+    assert [step["name"] for step in report["cleaning"]][:3] == ["thin", "duplicates", "floor"]
     kept, aligned = read_cloud(out / "object.ply"), read_cloud(out / "aligned.ply")
     np.testing.assert_allclose(found.to_scan(aligned.points), kept.points, atol=1e-3)
     columns = read_scalars(out / "object.ply", read_header(out / "object.ply"))

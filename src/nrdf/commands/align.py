@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Unit = Literal["m", "cm", "mm", "in"]
-Skip = Literal["duplicates", "floor", "outliers", "objects"]
+Skip = Literal["thin", "duplicates", "floor", "outliers", "objects"]
 MOST_POSES = 3  # that a picture shows
 
 
@@ -129,6 +129,8 @@ def read_scan(
     places = np.array(sensor, float).reshape(-1, 3) if sensor else None
     cloud = nrdf.read_cloud(path, topic=topic)
     found = nrdf.align(model, cloud, up, places, unit, skip, examples)
+    if found.unit.origin == "guessed":
+        log.info("%s: the unit is guessed to be %s", path, found.unit.name)
     for doubt in found.doubts:
         log.warning("%s: %s", path, doubt)
     return found

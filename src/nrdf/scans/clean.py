@@ -15,7 +15,9 @@ from nrdf.errors import CloudError, unknown_name
 from nrdf.geometry import bounding_box, thin
 from nrdf.scans.floor import Plane, find_floor
 
-STEPS = ("duplicates", "floor", "outliers", "objects")
+STEPS = ("thin", "duplicates", "floor", "outliers", "objects")
+MOST_POINTS = 200_000
+"""What a scan is thinned to, evenly; the field itself looks at far fewer."""
 WORKING_POINTS = 30_000
 """Points that decisions are made on; those between follow the nearest of them."""
 _NEIGHBOURS = 12
@@ -56,7 +58,8 @@ def clean_scan(
     skip: Collection[str] = (),
     minimum_points: int = 256,
 ) -> Cleaned:
-    """Leave out repeated points, the floor, outliers, and all objects but the largest.
+    """Thin a scan, and leave out repeated points, the floor, outliers, and all objects but the
+    largest.
 
     up: (3,) unit vector, None if unknown. skip: those of `STEPS` to leave out. Raises CloudError
     for an unknown step, or where fewer than `minimum_points` remain (naming the step that took
@@ -82,8 +85,12 @@ def clean_scan(
                 f"object in the scan? --skip {worst.name} leaves that step out"
             )
 
+    if "thin" not in skip:
+        mask = np.zeros(len(kept), bool)
+        mask[thin(scan.points, MOST_POINTS, rng)] = True
+        keep("thin", mask, f"{mask.sum()} points, evenly spread, are enough")
     if "duplicates" not in skip:
-        mask = _first_of_equal(scan.points)
+        mask = _first_of_equal(scan.points[kept])
         keep("duplicates", mask, "the same coordinates as another point")
     if "floor" not in skip:
         floor = find_floor(scan.points[kept], up, rng)
