@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,6 +16,7 @@ from nrdf.scans.align import Alignment, Candidate, align_scan
 from nrdf.scans.judge import Judge, family_prototypes
 from nrdf.scans.mirror import mirror_plane
 from nrdf.scans.target import bring_in
+from nrdf.scans.units import find_unit
 from nrdf.shapes.families import get_family
 from nrdf.similarity import Similarity, about_up, up_axis, upright
 from scenes import UP, pose, scan_of, yaw_error
@@ -54,7 +56,11 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     found = bring_in(judge("chair"), scan.cloud, UP, unit="mm")
     assert yaw_error(found.alignment.best.pose, PLACE) < 5
     assert found.alignment.best.pose.scale == pytest.approx(900, rel=0.03)
-    assert found.unit.name == "mm" and found.fits and found.cleaned.others == 0
+    assert found.unit.name == "mm" and found.fits and found.doubts == []
+    wrong = replace(found, unit=find_unit("m", 900, "chair"))
+    assert ["the unit may be wrong: 900 m" in doubt for doubt in wrong.doubts] == [True]
+    two = replace(found, cleaned=replace(found.cleaned, others=1))
+    assert ["2 objects of comparable size" in doubt for doubt in two.doubts] == [True]
     surface = full("chair", CHAIR)
     names = get_family("chair").region_of(surface.coordinates)
     taught = found.judge.model.set_reference(PointCloud(surface.points, surface.normals))

@@ -19,7 +19,9 @@ from nrdf.similarity import Similarity, up_axis
 # On the test shapes, whole and in single views, these tell chairs, cars and aircraft apart.
 _FOREIGN = 0.5  # cost above the usual one from which an object is not of the category
 _STRANGEST = 1.65  # standard deviations of the proportions, likewise
-_MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
+_ONE_SIDED = (0.5, 0.9)
+"""Symmetry between which the field is shown the mirror image too: the plane is trusted, and what
+one of its sides shows the other one lacks."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,9 @@ class AlignedScan:
 
     def embed(self) -> Embedded:
         """The object as the model's field sees it, in the likeliest pose."""
-        best = self.alignment.best
-        return self.judge.model.embed(self.cleaned.cloud, best.pose, best.symmetry > _MIRRORED)
+        low, high = _ONE_SIDED
+        mirrored = low < self.alignment.best.symmetry < high
+        return self.judge.model.embed(self.cleaned.cloud, self.pose, mirrored)
 
     def in_scan(self, match: Match) -> Match:
         """A match on the object, its indices those of the scan's points."""
