@@ -41,8 +41,12 @@ class AlignedScan:
         return self.alignment.best.pose
 
     def embed(self) -> Embedded:
-        """The object as the model's field sees it, in the likeliest pose."""
-        return self.judge.model.embed(self.cleaned.cloud, self.pose, self._is_one_sided)
+        """The object as the model's field sees it, in the likeliest pose.
+
+        Sheets whose side nothing tells stand for both (`Embedded.two_sided`).
+        """
+        seen = self.judge.model.embed(self.cleaned.cloud, self.pose, self._is_one_sided)
+        return seen.two_sided()
 
     def embed_in_metres(self, unit: str) -> Embedded:
         """As `embed`, of the object in metres, its scan being in `unit`."""

@@ -1,6 +1,6 @@
 """A scan in any pose: simulated, cleaned, aligned, and a region found on it.
 
-python examples/04_scan_in_any_pose.py
+python examples/06_scan_in_any_pose.py
 """
 
 import numpy as np
