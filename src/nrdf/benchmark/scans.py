@@ -36,6 +36,7 @@ NOISE = 0.001 / 0.9  # of depth, on objects whose longest side is 1: 1 mm on a 0
 KINDS = {"full": 0, "3 views": 3, "1 view": 1}
 """Cameras of each kind of scan; 0 is the full surface."""
 LEAST = 20  # points of the surface, of 8192, from which a region counts as there
+SHARED = 0.5  # share of its places that the target has, likewise; engines may be elsewhere
 SEEN, UNSEEN = 0.3, 0.02
 """Share of a region's due points in a scan, from which it was seen, and below which it was not."""
 UP = up_axis("z")
@@ -176,6 +177,9 @@ def score_regions(judge: Judge, category: str, pair: int) -> list[RegionFigure]:
     names, true = family.region_of(taught_on.coordinates), family.region_of(surface.coordinates)
     regions = {r: names == r for r in family.region_names if (names == r).sum() >= LEAST}
     share = {r: float((true == r).mean()) for r in regions}
+    exists = target.locate(taught_on.coordinates).exists
+    shared = {r for r, mask in regions.items() if exists[mask].mean() >= SHARED}
+    regions = {r: mask for r, mask in regions.items() if r in shared or share[r] == 0}
     taught = judge.model.set_reference(PointCloud(taught_on.points, taught_on.normals))
     matches = taught.retrieve_all(regions, PointCloud(surface.points))
     figures = _compare("canonical", pair, matches, surface.points, true, share)

@@ -225,8 +225,7 @@ class Taught:
         region = surface.select(self._working_mask(indices))
         # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
         off = target.distance(region.points - region.moved, region.normals)
-        usual = float(np.median(surface.error))
-        return match.with_presence(find_presence(region.existence, region.error, usual, off))
+        return match.with_presence(find_presence(region.existence, off))
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped
