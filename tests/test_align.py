@@ -19,7 +19,7 @@ from nrdf.scans.target import bring_in
 from nrdf.shapes.families import get_family
 from nrdf.similarity import Similarity, about_up, up_axis, upright
 from nrdf.units import find_unit
-from scenes import UP, pose, scan_of, yaw_error
+from scenes import UP, pose, scan_of, triangles, yaw_error
 
 CHAIR, ARMCHAIR = 1_000_003, 900_077
 PLACE = pose(2.2, 900.0, (300, -50, 20))
@@ -71,6 +71,24 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     assert (scan.face[match.indices] >= 0).all(), "nothing of the floor"
     near = np.abs(inside[:, 1] - np.median(seat[:, 1])) < 0.06
     assert near.mean() > 0.9
+
+
+def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
+    family, surface = get_family("chair"), full("chair", CHAIR)
+    names = family.region_of(surface.coordinates)
+    scan = scan_of("chair", CHAIR, PLACE, views=1)
+    coordinates = triangles("chair", CHAIR).at(scan.face, scan.second, scan.third)
+    true = family.region_of(coordinates)
+    bare = bring_in(judge("chair"), replace(scan.cloud, sensors=None), UP)
+    seen = bring_in(judge("chair"), scan.cloud, UP).embed()
+    two = bare.embed()
+    assert len(two.working) > 1.5 * len(np.unique(two.working))
+    assert len(seen.working) == len(np.unique(seen.working)), "sensors tell the side"
+    taught = bare.judge.model.set_reference(PointCloud(surface.points, surface.normals))
+    match = bare.in_scan(taught.retrieve(names == "seat", two))
+    assert (np.diff(match.indices) > 0).all() and len(match.confidence) == len(match.indices)
+    assert (true == "seat")[match.indices].mean() > 0.9
+    assert len(match.indices) > 0.9 * (true == "seat").sum()
 
 
 def test_up_is_searched_where_it_is_not_known():

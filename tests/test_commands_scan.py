@@ -33,7 +33,8 @@ def files(tmp_path_factory):
     write_cloud(folder / "armchair.ply", PointCloud(arms.points, arms.normals))
     names_arms = get_family("chair").region_of(arms.coordinates)
     np.savez(folder / "arms.npz", **{n: names_arms == n for n in ("seat", "arm-left")})
-    np.savez(folder / "regions.npz", **{n: names == n for n in ("seat", "back-front")})
+    chosen = ("seat", "back-front", "leg-left-front")
+    np.savez(folder / "regions.npz", **{n: names == n for n in chosen})
     floor = np.random.default_rng(0).uniform([-2, -2, 0], [2, 2, 1e-3], (3000, 3))
     write_cloud(folder / "floor.ply", PointCloud(floor))
     return folder
@@ -145,14 +146,21 @@ def test_up_may_begin_with_a_dash(files, tmp_path, capsys):
 def test_a_real_scan_goes_through(files, tmp_path):
     shutil.copy(SHARED_SCAN, tmp_path / "chair.off")
     out = tmp_path / "result"
-    assert run("retrieve", "--model", "chair", "--reference", files / "armchair.ply", "--region",
-               files / "arms.npz", "--target", tmp_path / "chair.off", "--up", "z", "--out", out
+    assert run("retrieve", "--model", "chair", "--reference", files / "ref.ply", "--region",
+               files / "regions.npz", "--target", tmp_path / "chair.off", "--up", "z", "--out", out
                ) == 0  # fmt: skip
     report = json.loads((out / "report.json").read_text())
     best = similarity(report["alignment"])
     assert 0.65 < best.scale < 0.75 and report["alignment"]["fits"]
-    assert report["alignment"]["probability"] > 0.9
-    left = best.to_canonical(read_cloud(out / "arm-left.ply").points)
-    assert np.median(left[:, 2]) < -0.2, "a sitter's left is -Z"
-    seat = best.to_canonical(read_cloud(out / "seat.ply").points)
-    assert abs(np.median(seat[:, 1]) - 0.1) < 0.1
+    assert report["alignment"]["probability"] > 0.9 and report["alignment"]["doubts"] == []
+    seat, back, leg = (
+        best.to_canonical(read_cloud(out / f"{name}.ply").points)
+        for name in ("seat", "back-front", "leg-left-front")
+    )
+    assert len(seat) > 200 and (np.abs(seat[:, 1] - 0.08) < 0.06).mean() > 0.97
+    assert (seat[:, 0] > 0.05).sum() > 120, "its middle was not seen, its front edge was"
+    # One sheet was measured of the backrest; it is its front as well as its back.
+    assert len(back) > 300 and np.quantile(back[:, 0], 0.95) < -0.15
+    assert np.ptp(np.quantile(back[:, 1], [0.1, 0.9])) > 0.25 and np.ptp(back[:, 2]) > 0.5
+    assert (leg[:, 0] > 0.1).all() and (leg[:, 2] < -0.2).all(), "a sitter's left is -Z"
+    assert leg[:, 1].min() < -0.45 and np.quantile(leg[:, 1], 0.95) < 0.1
