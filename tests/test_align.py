@@ -89,6 +89,11 @@ def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
     assert (np.diff(match.indices) > 0).all() and len(match.confidence) == len(match.indices)
     assert (true == "seat")[match.indices].mean() > 0.9
     assert len(match.indices) > 0.9 * (true == "seat").sum()
+    on_seat = np.isin(bare.cleaned.kept, np.flatnonzero(true == "seat"))
+    for side, sign in (("seat", 1), ("seat-bottom", -1)):
+        turned = taught.facing({side: names == side}, bare.embed_in_metres("m"))
+        up = sign * turned.normals[on_seat[turned.working], 1]
+        assert (up > 0).mean() > 0.9, "the side that was asked for"
 
 
 def test_up_is_searched_where_it_is_not_known():

@@ -125,7 +125,7 @@ class Teacher:
         """
         start = time.perf_counter()
         if isinstance(target, Embedded):
-            embedded = target
+            embedded = self.taught.facing(self.lesson.regions, target)
         else:
             known = known_unit(target, unit, self.lesson.knowledge.category, "the target", "unit")
             embedded = self.model.embed(in_metres(target, known))

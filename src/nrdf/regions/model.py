@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -217,6 +218,28 @@ class Taught:
         points = self.reference.canonical(points)
         normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
+
+    def facing(self, regions: Mapping[str, np.ndarray], target: Embedded) -> Embedded:
+        """The target with its sheets turned to the side that the regions are on.
+
+        regions: name to mask (n,) or indices (m,) on the reference. Only points whose side nothing
+        tells are turned (`Embedded.two_sided`): a seat that was measured as one sheet becomes the
+        top of a seat where that is taught, and its underside where that is.
+        """
+        both, count = target.two_sided(), len(target.working)
+        if len(both.working) == count:
+            return target
+        mapped = self.map_surface(target)
+        asked, _ = voters(
+            mapped.points, mapped.normals, both.points, both.normals, NORMAL_WEIGHT, VOTERS
+        )
+        wanted = np.any([self._working_mask(indices) for indices in regions.values()], axis=0)
+        claim = wanted[asked].mean(axis=1)
+        again = np.flatnonzero(np.isin(target.working, both.working[count:]))
+        turned = again[claim[count:] > claim[again]]
+        normals = target.normals.copy()
+        normals[turned] *= -1
+        return replace(target, normals=normals)
 
     def _judged(
         self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
