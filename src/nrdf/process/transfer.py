@@ -31,6 +31,7 @@ from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
+from nrdf.similarity import Similarity
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
@@ -68,7 +69,8 @@ class TransferredPath:
 class Transferred:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
-    target: with normals, estimated where its file had none. seconds: time by phase.
+    target: with normals, estimated where its file had none. seconds: time by phase. pose: from
+    canonical coordinates to the target's, for pictures that stand upright.
     """
 
     lesson: Lesson
@@ -77,6 +79,7 @@ class Transferred:
     paths: tuple[TransferredPath, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+    pose: Similarity | None = None
 
     def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
         """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
@@ -146,7 +149,8 @@ class Teacher:
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        return Transferred(self.lesson, with_normals(embedded), found, paths, warnings, seconds)
+        cloud, pose = with_normals(embedded), embedded.pose
+        return Transferred(self.lesson, cloud, found, paths, warnings, seconds, pose)
 
     def steps(self) -> list[tuple[str, int, Process]]:
         """Every process with its region and number there, in the order in which they are done."""
