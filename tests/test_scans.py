@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,7 +57,12 @@ def test_truth_is_there_absent_or_hidden():
         "seat": "there", "arm": "absent", "back": "hidden", "leg": "hidden"
     }  # fmt: skip
     assert figures["seat"].cd_l1 == 0 and figures["arm"].reason == ABSENT
-    rows = {(kind, what): value for kind, what, value, _ in scans.summary([], figures.values())}
+    whole = [replace(figures["seat"], kind="canonical", region=r, cd_l1=c)
+             for r, c in (("seat", 0.02), ("back", 0.04))]  # fmt: skip
+    every = [*figures.values(), *whole]
+    rows = {(kind, what): value for kind, what, value, _ in scans.summary([], every)}
+    assert rows["canonical", "CD-L1"] == pytest.approx(0.03)
+    assert rows["1 view", "CD-L1"] == 0 and rows["1 view", "the same regions canonical"] == 0.02
     assert rows["1 view", "absent, reported absent"] == 1
     assert rows["1 view", "not seen, returned empty"] == 1
     assert rows["1 view", "there, reported absent"] == 0

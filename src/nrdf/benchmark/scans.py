@@ -256,12 +256,15 @@ def summary(
         add(kind, "right poses that were doubted", [p.doubted for p in mine if p.yaw < 5])
         add(kind, "seconds", [p.seconds for p in mine])
         add(kind, "seconds of processor time", [p.processor_seconds for p in mine])
+    canonical = {(r.pair, r.region): r.cd_l1 for r in regions if r.kind == "canonical"}
     for kind in ("canonical", *KINDS):
         there, absent, hidden = (
             [r for r in regions if r.kind == kind and r.state == state]
             for state in ("there", "absent", "hidden")
         )
         add(kind, "CD-L1", [r.cd_l1 for r in there])
+        if kind != "canonical":
+            add(kind, "the same regions canonical", [canonical[r.pair, r.region] for r in there])
         add(kind, "CD-L1 of those found", [r.cd_l1 for r in there if r.found])
         add(kind, "there, reported absent", [r.reason == ABSENT for r in there])
         add(kind, "there, found nowhere", [not r.found for r in there])
