@@ -89,6 +89,8 @@ def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
     assert (np.diff(match.indices) > 0).all() and len(match.confidence) == len(match.indices)
     assert (true == "seat")[match.indices].mean() > 0.9
     assert len(match.indices) > 0.9 * (true == "seat").sum()
+    snapped = taught.retrieve(names == "seat", two, "points").indices
+    assert (np.diff(snapped) > 0).all() and (true == "seat")[snapped].mean() > 0.8
     on_seat = np.isin(bare.cleaned.kept, np.flatnonzero(true == "seat"))
     for side, sign in (("seat", 1), ("seat-bottom", -1)):
         turned = taught.facing({side: names == side}, bare.embed_in_metres("m"))

@@ -279,10 +279,10 @@ class Taught:
 
     def _by_points(self, mapped: Mapped, target: Embedded) -> Match:
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
-        found, first = np.unique(nearest, return_index=True)
+        found, first = np.unique(target.working[nearest], return_index=True)
         trust = mapped.trust * np.exp(-distance / TRUST_SCALE)
         return Match(
-            indices=target.working[found],
+            indices=found,
             points=target.original(mapped.points),
             confidence=np.clip(trust[first], 0.0, 1.0),
             method="points",

@@ -88,7 +88,7 @@ def clean_scan(
     if "thin" not in skip:
         mask = np.zeros(len(kept), bool)
         mask[thin(scan.points, MOST_POINTS, rng)] = True
-        keep("thin", mask, f"{mask.sum()} points, evenly spread, are enough")
+        keep("thin", mask, f"{MOST_POINTS} points, evenly spread, are enough")
     if "duplicates" not in skip:
         mask = _first_of_equal(scan.points[kept])
         keep("duplicates", mask, "the same coordinates as another point")
