@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,7 +18,8 @@ from nrdf.scans.mirror import mirror_plane
 from nrdf.scans.target import bring_in
 from nrdf.shapes.families import get_family
 from nrdf.similarity import Similarity, about_up, up_axis, upright
-from scenes import UP, pose, scan_of, yaw_error
+from nrdf.units import find_unit
+from scenes import UP, pose, scan_of, triangles, yaw_error
 
 CHAIR, ARMCHAIR = 1_000_003, 900_077
 PLACE = pose(2.2, 900.0, (300, -50, 20))
@@ -54,7 +56,11 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     found = bring_in(judge("chair"), scan.cloud, UP, unit="mm")
     assert yaw_error(found.alignment.best.pose, PLACE) < 5
     assert found.alignment.best.pose.scale == pytest.approx(900, rel=0.03)
-    assert found.unit.name == "mm" and found.fits and found.cleaned.others == 0
+    assert found.unit.name == "mm" and found.fits and found.doubts == []
+    wrong = replace(found, unit=find_unit("m", 900, "chair"))
+    assert ["the unit may be wrong: 900 m" in doubt for doubt in wrong.doubts] == [True]
+    two = replace(found, cleaned=replace(found.cleaned, others=1))
+    assert ["2 objects of comparable size" in doubt for doubt in two.doubts] == [True]
     surface = full("chair", CHAIR)
     names = get_family("chair").region_of(surface.coordinates)
     taught = found.judge.model.set_reference(PointCloud(surface.points, surface.normals))
@@ -65,6 +71,31 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     assert (scan.face[match.indices] >= 0).all(), "nothing of the floor"
     near = np.abs(inside[:, 1] - np.median(seat[:, 1])) < 0.06
     assert near.mean() > 0.9
+
+
+def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
+    family, surface = get_family("chair"), full("chair", CHAIR)
+    names = family.region_of(surface.coordinates)
+    scan = scan_of("chair", CHAIR, PLACE, views=1)
+    coordinates = triangles("chair", CHAIR).at(scan.face, scan.second, scan.third)
+    true = family.region_of(coordinates)
+    bare = bring_in(judge("chair"), replace(scan.cloud, sensors=None), UP)
+    seen = bring_in(judge("chair"), scan.cloud, UP).embed()
+    two = bare.embed()
+    assert len(two.working) > 1.5 * len(np.unique(two.working))
+    assert len(seen.working) == len(np.unique(seen.working)), "sensors tell the side"
+    taught = bare.judge.model.set_reference(PointCloud(surface.points, surface.normals))
+    match = bare.in_scan(taught.retrieve(names == "seat", two))
+    assert (np.diff(match.indices) > 0).all() and len(match.confidence) == len(match.indices)
+    assert (true == "seat")[match.indices].mean() > 0.9
+    assert len(match.indices) > 0.9 * (true == "seat").sum()
+    snapped = taught.retrieve(names == "seat", two, "points").indices
+    assert (np.diff(snapped) > 0).all() and (true == "seat")[snapped].mean() > 0.8
+    on_seat = np.isin(bare.cleaned.kept, np.flatnonzero(true == "seat"))
+    for side, sign in (("seat", 1), ("seat-bottom", -1)):
+        turned = taught.facing({side: names == side}, bare.embed_in_metres("m"))
+        up = sign * turned.normals[on_seat[turned.working], 1]
+        assert (up > 0).mean() > 0.9, "the side that was asked for"
 
 
 def test_up_is_searched_where_it_is_not_known():
@@ -99,6 +130,16 @@ def test_a_stool_that_looks_alike_from_all_sides_is_ambiguous():
     found = bring_in(judge("chair"), PointCloud(np.vstack([top, legs])), up_axis("y"))
     assert found.alignment.is_ambiguous and len(found.alignment.likely) >= 2
     assert any("the pose is ambiguous: yaws of" in doubt for doubt in found.doubts)
+
+
+def test_a_car_is_no_chair():
+    car = PointCloud(full("car", CHAIR).points)
+    found = bring_in(judge("chair"), car, up_axis("y"))
+    assert not found.fits
+    assert any("does not look like a chair" in doubt for doubt in found.doubts)
+    assert bring_in(judge("car"), car, up_axis("y")).fits
+    chair = PointCloud(full("chair", CHAIR).points)
+    assert not bring_in(judge("car"), chair, up_axis("y")).fits
 
 
 def test_likely_poses_are_those_that_no_other_one_beats_clearly():

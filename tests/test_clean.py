@@ -7,7 +7,7 @@ import pytest
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError
-from nrdf.scans.clean import clean_scan
+from nrdf.scans.clean import MOST_POINTS, STEPS, clean_scan
 from nrdf.scans.floor import find_floor
 from nrdf.shapes.families import get_family
 from scenes import UP, pose, scan_of
@@ -68,6 +68,14 @@ def test_a_small_thing_beside_the_object_is_no_second_object():
     assert cleaned.others == 0 and cleaned.kept.max() < len(chair)
 
 
+def test_parts_that_only_the_view_separates_stay_together():
+    chair = scan_of("chair", CHAIR, pose(0.0)).cloud.points
+    height = chair @ UP
+    gap = (height > -0.3) & (height < 0.0)  # most of the legs was not seen
+    cleaned = clean_scan(PointCloud(chair[~gap]), UP)
+    assert (chair[~gap][cleaned.kept] @ UP < -0.3).any()
+
+
 def test_outliers_and_duplicates_go():
     chair = scan_of("chair", CHAIR).cloud
     lonely = np.random.default_rng(1).uniform(-1.5, 1.5, (60, 3))
@@ -77,9 +85,7 @@ def test_outliers_and_duplicates_go():
     assert removed["duplicates"] == 500
     assert (cleaned.kept >= len(chair)).sum() <= 3, "lonely points, or repeated ones"
     assert (cleaned.kept < len(chair)).sum() > 0.995 * len(chair)
-    everything = clean_scan(
-        PointCloud(points), UP, skip=["duplicates", "floor", "outliers", "objects"]
-    )
+    everything = clean_scan(PointCloud(points), UP, skip=STEPS)
     np.testing.assert_array_equal(everything.kept, np.arange(len(points)))
 
 
@@ -99,11 +105,24 @@ def test_all_that_belongs_to_a_point_goes_with_it():
     assert cleaned.cloud.unit == "mm"
 
 
+def test_a_scan_of_many_points_is_thinned():
+    chair = scan_of("chair", CHAIR).cloud.points
+    rng = np.random.default_rng(0)
+    many = np.repeat(chair, MOST_POINTS // len(chair) + 2, axis=0)
+    many += 1e-3 * rng.normal(size=many.shape)
+    cleaned = clean_scan(PointCloud(many), UP)
+    assert cleaned.steps[0].name == "thin"
+    assert cleaned.steps[0].removed == len(many) - MOST_POINTS
+    assert 0.95 * MOST_POINTS < len(cleaned.kept) <= MOST_POINTS
+    everything = clean_scan(PointCloud(many), UP, skip=["thin"])
+    assert len(everything.kept) > 0.95 * len(many)
+
+
 def test_a_scan_of_nothing_but_floor_is_refused():
     with pytest.raises(CloudError, match=r"the step 'floor' removed 5000 .* --skip floor leaves"):
         clean_scan(PointCloud(FLOOR_ONLY), UP)
 
 
 def test_unknown_steps_are_refused():
-    with pytest.raises(CloudError, match="no step of cleaning 'wall'; known: duplicates, floor"):
+    with pytest.raises(CloudError, match="no step of cleaning 'wall'; known: thin, duplicates"):
         clean_scan(PointCloud(FLOOR_ONLY), UP, skip=["wall"])

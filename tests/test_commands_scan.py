@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from nrdf import cli
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.ply import read_header, read_scalars
 from nrdf.shapes.families import get_family
-from nrdf.similarity import Similarity
+from nrdf.similarity import Similarity, about_up, up_axis, upright
 from scenes import pose, scan_of, yaw_error
 
 SEED = 1_000_003
@@ -32,7 +33,8 @@ def files(tmp_path_factory):
     write_cloud(folder / "armchair.ply", PointCloud(arms.points, arms.normals))
     names_arms = get_family("chair").region_of(arms.coordinates)
     np.savez(folder / "arms.npz", **{n: names_arms == n for n in ("seat", "arm-left")})
-    np.savez(folder / "regions.npz", **{n: names == n for n in ("seat", "back-front")})
+    chosen = ("seat", "back-front", "leg-left-front")
+    np.savez(folder / "regions.npz", **{n: names == n for n in chosen})
     floor = np.random.default_rng(0).uniform([-2, -2, 0], [2, 2, 1e-3], (3000, 3))
     write_cloud(folder / "floor.ply", PointCloud(floor))
     return folder
@@ -56,7 +58,7 @@ def test_align_writes_pose_object_and_picture(files, tmp_path, capsys):
     found = similarity(report)
     assert yaw_error(found, PLACE) < 5 and found.scale == pytest.approx(850, rel=0.03)
     assert report["unit"] == {"name": "mm", "origin": "guessed"} and report["doubts"] == []
-    assert [step["name"] for step in report["cleaning"]][:2] == ["duplicates", "floor"]
+    assert [step["name"] for step in report["cleaning"]][:3] == ["thin", "duplicates", "floor"]
     kept, aligned = read_cloud(out / "object.ply"), read_cloud(out / "aligned.ply")
     np.testing.assert_allclose(found.to_scan(aligned.points), kept.points, atol=1e-3)
     columns = read_scalars(out / "object.ply", read_header(out / "object.ply"))
@@ -125,3 +127,40 @@ def test_options_for_scans_need_up(files, tmp_path, capsys):
              files / "regions.npz", "--target", files / "scan.ply"]  # fmt: skip
     assert run(*words, "--skip", "floor", "--out", tmp_path / "a") == 2
     assert "are for scans: give --up" in capsys.readouterr().err
+
+
+def test_up_may_begin_with_a_dash(files, tmp_path, capsys):
+    assert cli._with_axes_joined(["align", "--up", "-y", "--out", "-z"]) == [
+        "align", "--up=-y", "--out", "-z"
+    ]  # fmt: skip
+    turned = Similarity(upright(up_axis("-x")) @ about_up(0.3), np.zeros(3), 1.0)
+    cloud = read_cloud(files / "ref.ply")
+    write_cloud(tmp_path / "t.ply", PointCloud(turned.to_scan(cloud.points)))
+    out = tmp_path / "a"
+    assert run("align", tmp_path / "t.ply", "--model", "chair", "--up", "-x", "--out", out) == 0
+    assert yaw_error(similarity(json.loads((out / "report.json").read_text())), turned) < 3
+
+
+@pytest.mark.skipif(not SHARED_SCAN.is_file(), reason="needs the real scan chair-2.off: any chair "
+                    "from a depth sensor, z up, as ../shared/scans/chair-2.off")  # fmt: skip
+def test_a_real_scan_goes_through(files, tmp_path):
+    shutil.copy(SHARED_SCAN, tmp_path / "chair.off")
+    out = tmp_path / "result"
+    assert run("retrieve", "--model", "chair", "--reference", files / "ref.ply", "--region",
+               files / "regions.npz", "--target", tmp_path / "chair.off", "--up", "z", "--out", out
+               ) == 0  # fmt: skip
+    report = json.loads((out / "report.json").read_text())
+    best = similarity(report["alignment"])
+    assert 0.65 < best.scale < 0.75 and report["alignment"]["fits"]
+    assert report["alignment"]["probability"] > 0.9 and report["alignment"]["doubts"] == []
+    seat, back, leg = (
+        best.to_canonical(read_cloud(out / f"{name}.ply").points)
+        for name in ("seat", "back-front", "leg-left-front")
+    )
+    assert len(seat) > 200 and (np.abs(seat[:, 1] - 0.08) < 0.06).mean() > 0.97
+    assert (seat[:, 0] > 0.05).sum() > 120, "its middle was not seen, its front edge was"
+    # One sheet was measured of the backrest; it is its front as well as its back.
+    assert len(back) > 300 and np.quantile(back[:, 0], 0.95) < -0.15
+    assert np.ptp(np.quantile(back[:, 1], [0.1, 0.9])) > 0.25 and np.ptp(back[:, 2]) > 0.5
+    assert (leg[:, 0] > 0.1).all() and (leg[:, 2] < -0.2).all(), "a sitter's left is -Z"
+    assert leg[:, 1].min() < -0.45 and np.quantile(leg[:, 1], 0.95) < 0.1

@@ -12,6 +12,7 @@ from nrdf.geometry import (
     canonical_transform,
     estimate_normals,
     fibonacci_directions,
+    seen_through,
     thin,
     visibility,
 )
@@ -190,6 +191,17 @@ def test_visibility_tells_the_outer_side_and_finds_buried_points():
     assert (seen[:6000] >= 10).mean() > 0.999
     assert unseen[:6000].mean() < 1.0
     assert (np.maximum(front, back)[6000:] < 3).mean() > 0.95
+
+
+def test_both_sides_are_seen_of_an_open_surface_only():
+    rng = np.random.default_rng(0)
+    points, normals = box(rng, 6000, (1.0, 0.05, 0.8))
+    assert not seen_through(points, normals).any()
+    bowl, lines = sphere(rng, 6000)
+    dish = bowl[:, 1] < -0.3
+    assert seen_through(bowl[dish], lines[dish]).mean() > 0.8
+    flask = bowl[:, 1] < 0.4  # a small hole changes nothing
+    assert not seen_through(bowl[flask], lines[flask]).any()
 
 
 def test_normals_of_a_partial_cloud_point_to_the_sensors_that_saw_it():

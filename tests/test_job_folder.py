@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from nrdf.process.lesson import read_lesson
 from nrdf.process.limits import Limits
 from nrdf.process.toolpath import read_job
 from nrdf.process.transfer import Teacher
+from nrdf.similarity import Similarity, up_axis, upright
 from taught_box import SAND, cloud, lesson, made_up
 
 PAINT = {
@@ -96,6 +98,15 @@ def test_lines_are_drawn_on_the_surface_also_of_tools_above_it(transferred):
     sides = np.concatenate(panel.lines["right"])
     np.testing.assert_allclose(sides[:, 2], transferred.target.points[:, 2].max(), atol=2e-3)
     assert len(panel.lines["top"]) >= 2 * 10
+
+
+def test_the_picture_stands_upright_whatever_the_targets_frame(transferred):
+    turn = upright(up_axis("z"))
+    lying = replace(transferred, pose=Similarity(turn, np.zeros(3), 1.0))
+    straight, panel = panel_of(transferred, "title"), panel_of(lying, "title")
+    np.testing.assert_allclose(panel.points, straight.points @ turn)
+    np.testing.assert_allclose(panel.normals, straight.normals @ turn)
+    np.testing.assert_allclose(panel.lines["top"][0], straight.lines["top"][0] @ turn)
 
 
 def test_nothing_found_is_a_report_all_the_same(tmp_path):

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError, RegionError
 from nrdf.field import build_field
 from nrdf.regions.embedded import encoder_subset
 from nrdf.regions.match import TRUST_SCALE
-from nrdf.regions.model import WORKING_POINTS, Model
+from nrdf.regions.model import WORKING_POINTS, Model, Taught
 from nrdf.shapes.families import get_family
+from nrdf.similarity import Similarity, about_up, up_axis, upright
 from solids import box
 
 SMALL = {
@@ -307,3 +309,45 @@ def test_clouds_that_cannot_be_used_are_refused(model, taught, reference):
     points[7, 1] = np.nan
     with pytest.raises(CloudError, match="NaN"):
         model.embed(PointCloud(points))
+
+
+def test_what_has_no_counterpart_on_the_reference_belongs_to_no_region(taught, reference):
+    cloud, _ = reference
+    low, high = cloud.points.min(0), cloud.points.max(0)
+    inside = np.random.default_rng(0).uniform(low, high, (2000, 3))
+    away = inside[cKDTree(cloud.points).query(inside)[0] > 0.15]
+    assert len(away) > 20
+    normals = np.vstack([cloud.normals, np.tile([0.0, 1.0, 0.0], (len(away), 1))])
+    more = PointCloud(np.vstack([cloud.points, away]), normals)
+    found = taught.retrieve(np.arange(COUNT), more).indices
+    assert (found < COUNT).mean() > 0.99 and len(found) > 0.95 * COUNT
+
+
+def test_a_pose_takes_the_place_of_orientation_and_box(taught, reference):
+    cloud, masks = reference
+    turn = upright(up_axis("z")) @ about_up(2.0)
+    pose = Similarity(turn, np.array([5.0, -7.0, 9.0]), 30.0)
+    own = taught.reference.pose
+    scan = PointCloud(pose.to_scan(own.to_canonical(cloud.points)), cloud.normals @ turn.T)
+    embedded = taught.model.embed(scan, pose)
+    match = taught.retrieve(masks["seat"], embedded)
+    assert overlap(match.indices, masks["seat"]) > 0.95
+    np.testing.assert_allclose(match.points, scan.points[masks["seat"]], atol=0.02)
+    found = Taught(taught.model, embedded).retrieve(scan.points[masks["seat"]], cloud)
+    assert overlap(found.indices, masks["seat"]) > 0.95
+
+
+def test_a_mirrored_half_is_embedded_as_the_whole():
+    family = get_family("chair")
+    sample = family.member(1).sample_surface(8000, np.random.default_rng(0))
+    whole = PointCloud(sample.points, sample.normals)
+    half = whole.select(sample.points[:, 2] > 0)
+    model = build()
+    pose = Similarity(np.eye(3), np.zeros(3), 1.0)
+    z, seen, completed = (
+        model.embed(cloud, pose, mirrored).z
+        for cloud, mirrored in ((whole, False), (half, False), (half, True))
+    )
+    assert (completed - z).norm() < 0.3 * (seen - z).norm()
+    points = model.embed(half, pose, mirrored=True).points
+    assert (points[:, 2] > 0).all(), "only the field sees the mirror image"

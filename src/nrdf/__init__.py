@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from nrdf.process.transfer import Teacher, Transferred
     from nrdf.regions.match import Match
     from nrdf.regions.model import Model, Taught
+    from nrdf.scans.target import align
 
 __all__ = [
     "CloudError",
@@ -55,6 +56,7 @@ __all__ = [
     "TrainingError",
     "Transferred",
     "__version__",
+    "align",
     "load_model",
     "read_cloud",
     "teach",
@@ -69,6 +71,7 @@ _HOMES = {
     **dict.fromkeys(("Model", "Taught"), "nrdf.regions.model"),
     **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
+    "align": "nrdf.scans.target",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
 

@@ -85,7 +85,7 @@ def run(given: list[str], verbose: bool = False) -> int:
         if given == ["--version"]:
             _say(f"nrdf {nrdf.__version__}")
             return 0
-        return _parse(given) or 0
+        return _parse(_with_axes_joined(given)) or 0
     except NrdfError as error:
         _complain(str(error))
         return error.exit_code
@@ -120,6 +120,17 @@ def _parse(given: list[str]) -> int | None:
         args=given,
         config=(tyro.conf.FlagCreatePairsOff,),
     )
+
+
+def _with_axes_joined(given: list[str]) -> list[str]:
+    """`--up -y` as `--up=-y`: a value that begins with a dash would pass for an option."""
+    words: list[str] = []
+    for word in given:
+        if words and words[-1] == "--up" and word in ("-x", "-y", "-z"):
+            words[-1] = f"--up={word}"
+        else:
+            words.append(word)
+    return words
 
 
 def _show_verbs() -> None:

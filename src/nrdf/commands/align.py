@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,6 +20,7 @@ from nrdf.commands.console import (
 )
 
 if TYPE_CHECKING:
+    from nrdf.cloud import PointCloud
     from nrdf.picture import Panel
     from nrdf.regions.model import Model
     from nrdf.scans.target import AlignedScan
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Unit = Literal["m", "cm", "mm", "in"]
-Skip = Literal["duplicates", "floor", "outliers", "objects"]
+Skip = Literal["thin", "duplicates", "floor", "outliers", "objects"]
 MOST_POSES = 3  # that a picture shows
 
 
@@ -40,6 +41,7 @@ def align(
     unit: Unit | None = None,
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
+    reference: tuple[Path, ...] = (),
     device: str = "cpu",
     strict: bool = False,
     overwrite: bool = False,
@@ -65,6 +67,8 @@ def align(
         unit: Unit of the scan; what its file says, or what is usual for the category, unless given.
         skip: Steps of cleaning to leave out.
         topic: What to read of a ROS 2 bag that has clouds under several topics.
+        reference: Examples of the category, +X forward and +Y up, to align by instead of members of
+            its parametric family; needed for a category that has none.
         device: cpu, cuda, cuda:N or auto.
         strict: End with 3 where there is any doubt: an ambiguous pose, a poor fit, several objects,
             an unlikely unit.
@@ -78,7 +82,8 @@ def align(
         from nrdf.picture import draw_regions
 
         loaded = nrdf.load_model(model, device)
-        found = read_scan(loaded, scan, up, sensor, unit, skip, topic)
+        examples = [nrdf.read_cloud(path) for path in reference]
+        found = read_scan(loaded, scan, up, sensor, unit, skip, topic, examples)
         warn_of_doubts(found, scan)
         best, cleaned = found.alignment.best, found.cleaned
         points = best.pose.to_canonical(cleaned.cloud.points)
@@ -106,31 +111,38 @@ def read_scan(
     unit: str | None = None,
     skip: tuple[str, ...] = (),
     topic: str | None = None,
+    examples: Sequence[PointCloud] = (),
 ) -> AlignedScan:
     """Read, clean and align a scan by a command's options.
 
-    Raises CloudError for options without sense, an unreadable scan, or one without an object.
+    `examples` of the category stand in for members of its family where there are any. Raises
+    CloudError for options without sense, an unreadable scan, or one without an object.
     """
     import numpy as np
 
-    from nrdf.cloud import read_cloud
+    import nrdf
     from nrdf.errors import CloudError
-    from nrdf.scans.judge import Judge
-    from nrdf.scans.target import bring_in
-    from nrdf.similarity import up_axis
 
     if len(sensor) % 3:
         raise CloudError(
             f"--sensor has {len(sensor)} numbers; three are needed for each sensor: x y z"
         )
     places = np.array(sensor, float).reshape(-1, 3) if sensor else None
-    direction = None if up == "auto" else up_axis(up)
-    cloud = read_cloud(path, topic=topic)
-    return bring_in(Judge(model), cloud, direction, places, unit, skip)
+    cloud = nrdf.read_cloud(path, topic=topic)
+    return nrdf.align(model, cloud, up, places, unit, skip, examples)
+
+
+def stand_ins(model: Model, reference: PointCloud) -> list[PointCloud]:
+    """Examples to align by: none where the category has a family, else the reference."""
+    from nrdf.shapes.families import FAMILY_NAMES
+
+    return [] if model.category in FAMILY_NAMES else [reference]
 
 
 def warn_of_doubts(found: AlignedScan, path: Path) -> None:
-    """Log every doubt about a scan as a warning."""
+    """Log every doubt about a scan as a warning, and a guess of its unit."""
+    if found.unit.origin == "guessed":
+        log.info("%s: the unit is guessed to be %s", path, found.unit.name)
     for doubt in found.doubts:
         log.warning("%s: %s", path, doubt)
 
@@ -147,6 +159,8 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "probability": round(best.probability, 4),
         "cost": round(best.cost, 4),
         "usual_cost": round(found.judge.usual_cost, 4),
+        "strangeness": round(found.strangeness, 3),
+        "fits": found.fits,
         "doubts": found.doubts,
         "unit": {"name": unit.name, "origin": unit.origin},
         "sensors": None if sensors is None else sensors,

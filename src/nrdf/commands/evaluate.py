@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score: on scans (bsrc), exact truth (families, carry), shapes (shape), planning (toolpaths).
+    """Score: BSRC (bsrc), exact truth (families, carry, scans), shapes (shape), plans (toolpaths).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
     from nrdf.commands.evaluate_carry import carry
+    from nrdf.commands.evaluate_scans import scans
     from nrdf.commands.evaluate_shape import shape
     from nrdf.commands.evaluate_toolpaths import toolpaths
 
@@ -37,6 +38,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
         "bsrc": bsrc,
         "families": families,
         "carry": carry,
+        "scans": scans,
         "toolpaths": toolpaths,
         "shape": shape,
     }

@@ -8,7 +8,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, warn_of_doubts
+from nrdf.commands.align import (
+    Skip,
+    Unit,
+    describe_alignment,
+    read_scan,
+    stand_ins,
+    warn_of_doubts,
+)
 from nrdf.commands.console import (
     command_line,
     console,
@@ -103,7 +110,8 @@ def retrieve(
                 raise CloudError("--sensor, --unit, --skip and --strict are for scans: give --up")
             target_cloud = nrdf.read_cloud(target, topic=topic)
         else:
-            scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+            examples = stand_ins(loaded, reference_cloud)
+            scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
             warn_of_doubts(scan, target)
             target_cloud, doubts = scan.scan, scan.doubts
         regions = read_regions(region, reference_cloud.unit)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan
+from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, stand_ins
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
 
 if TYPE_CHECKING:
@@ -99,7 +99,8 @@ def transfer(
             known = known_unit(cloud, unit, category, str(target), "--unit")
         else:
             with errors.status("alignment"):
-                scan = read_scan(loaded, target, up, sensor, unit, skip, topic)
+                examples = stand_ins(loaded, lesson.cloud)
+                scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
             known = _scan_unit(scan, target)
         with errors.status("reference"):
             teacher = Teacher(lesson, loaded)

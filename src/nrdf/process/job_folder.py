@@ -76,7 +76,8 @@ def job_of(transferred: Transferred) -> Job:
 
 
 def panel_of(transferred: Transferred, title: str, note: str = "") -> Panel:
-    """The target with its regions and the lines of its tool paths, for a picture."""
+    """The target, upright, with its regions and the lines of its tool paths, for a picture."""
+    turn = np.eye(3) if transferred.pose is None else transferred.pose.rotation
     regions = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
     lines: dict[str, list[np.ndarray]] = {}
     for step in transferred.paths:
@@ -84,8 +85,10 @@ def panel_of(transferred: Transferred, title: str, note: str = "") -> Panel:
             work = [s for s in step.path.segments if s.kind == "process"]
             height = step.process.standoff_m
             drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
-            lines.setdefault(step.region, []).extend(drawn)
-    return Panel(title, transferred.target.points, transferred.target.normals, regions, note, lines)
+            lines.setdefault(step.region, []).extend(line @ turn for line in drawn)
+    target = transferred.target
+    normals = None if target.normals is None else target.normals @ turn
+    return Panel(title, target.points @ turn, normals, regions, note, lines)
 
 
 def _knowledge(transferred: Transferred, folder: Path, origin: Mapping[str, Any]) -> Knowledge:

@@ -34,6 +34,7 @@ from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
+from nrdf.similarity import Similarity
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
@@ -71,7 +72,8 @@ class TransferredPath:
 class Transferred:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
-    target: with normals, estimated where its file had none. seconds: time by phase.
+    target: with normals, estimated where its file had none. seconds: time by phase. pose: from
+    canonical coordinates to the target's, for pictures that stand upright.
     """
 
     lesson: Lesson
@@ -80,6 +82,7 @@ class Transferred:
     paths: tuple[TransferredPath, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
+    pose: Similarity | None = None
 
     def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
         """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
@@ -134,7 +137,7 @@ class Teacher:
         """
         start = time.perf_counter()
         if isinstance(target, Embedded):
-            embedded = target
+            embedded = self.taught.facing(self.lesson.regions, target)
         else:
             known = known_unit(target, unit, self.lesson.knowledge.category, "the target", "unit")
             embedded = self.model.embed(in_metres(target, known))
@@ -157,9 +160,8 @@ class Teacher:
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        return Transferred(
-            self.lesson, with_normals(embedded), found, tuple(paths), warnings, seconds
-        )
+        cloud, pose = with_normals(embedded), embedded.pose
+        return Transferred(self.lesson, cloud, found, tuple(paths), warnings, seconds, pose)
 
     def _marked(
         self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud

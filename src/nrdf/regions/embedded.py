@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ import torch
 from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
-from nrdf.geometry import thin
+from nrdf.geometry import seen_through, thin
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.similarity import Similarity
 
@@ -19,9 +19,9 @@ from nrdf.similarity import Similarity
 class Embedded:
     """A cloud as the field sees it: thinned, with normals, canonical, with its embedding z.
 
-    cloud: what the user gave. working: (n,) indices of its points in use. points, normals: (n, 3)
-    canonical. pose: from canonical coordinates to the cloud's. z: (1, d_z). seconds: time of each
-    phase.
+    cloud: what the user gave. working: (n,) indices of its points in use; one that stands for both
+    sides of a sheet is there twice. points, normals: (n, 3) canonical. pose: from canonical
+    coordinates to the cloud's. z: (1, d_z). seconds: time of each phase.
     """
 
     cloud: PointCloud
@@ -52,13 +52,32 @@ class Embedded:
         """Selected working points as indices of the whole cloud, and which working point each
         follows (its nearest): (k,) indices into `cloud.points`, (k,) positions in `working`.
         """
-        index = np.flatnonzero(selected[self.nearest_working])
-        return index, self.nearest_working[index]
+        position = np.full(len(self.cloud.points), -1)
+        position[self.working[selected]] = np.flatnonzero(selected)
+        follows = position[self.working[self.nearest_working]]
+        index = np.flatnonzero(follows >= 0)
+        return index, follows[index]
+
+    def two_sided(self) -> Embedded:
+        """The same, points of sheets whose side nothing tells standing for both of their sides.
+
+        Of a cloud that is open, without normals and without sensors: what was not seen in front of
+        a sheet makes its back as likely as its front. The embedding stays.
+        """
+        if self.cloud.normals is not None or self.cloud.sensors is not None:
+            return self
+        again = np.flatnonzero(seen_through(self.points, self.normals))
+        return replace(
+            self,
+            working=np.concatenate([self.working, self.working[again]]),
+            points=np.concatenate([self.points, self.points[again]]),
+            normals=np.concatenate([self.normals, -self.normals[again]]),
+        )
 
     @property
     def is_whole(self) -> bool:
         """Whether every point of the cloud is in use."""
-        return len(self.working) == len(self.cloud.points)
+        return np.array_equal(self.working, np.arange(len(self.cloud.points)))
 
     @cached_property
     def nearest_working(self) -> np.ndarray:

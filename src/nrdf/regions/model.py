@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -233,6 +234,28 @@ class Taught:
         here = oriented_features(self.reference.points, self.reference.normals, NORMAL_WEIGHT)
         return np.asarray(np.linalg.norm(there - here[own], axis=1))
 
+    def facing(self, regions: Mapping[str, np.ndarray], target: Embedded) -> Embedded:
+        """The target with its sheets turned to the side that the regions are on.
+
+        regions: name to mask (n,) or indices (m,) on the reference. Only points whose side nothing
+        tells are turned (`Embedded.two_sided`): a seat that was measured as one sheet becomes the
+        top of a seat where that is taught, and its underside where that is.
+        """
+        both, count = target.two_sided(), len(target.working)
+        if len(both.working) == count:
+            return target
+        mapped = self.map_surface(target)
+        asked, _ = voters(
+            mapped.points, mapped.normals, both.points, both.normals, NORMAL_WEIGHT, VOTERS
+        )
+        wanted = np.any([self._working_mask(indices) for indices in regions.values()], axis=0)
+        claim = wanted[asked].mean(axis=1)
+        again = np.flatnonzero(np.isin(target.working, both.working[count:]))
+        turned = again[claim[count:] > claim[again]]
+        normals = target.normals.copy()
+        normals[turned] *= -1
+        return replace(target, normals=normals)
+
     def _judged(
         self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
     ) -> Match:
@@ -240,8 +263,7 @@ class Taught:
         region = surface.select(self._working_mask(indices))
         # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
         off = target.distance(region.points - region.moved, region.normals)
-        usual = float(np.median(surface.error))
-        return match.with_presence(find_presence(region.existence, region.error, usual, off))
+        return match.with_presence(find_presence(region.existence, off))
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped
@@ -272,10 +294,10 @@ class Taught:
 
     def _by_points(self, mapped: Mapped, target: Embedded) -> Match:
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
-        found, first = np.unique(nearest, return_index=True)
+        found, first = np.unique(target.working[nearest], return_index=True)
         trust = mapped.trust * np.exp(-distance / TRUST_SCALE)
         return Match(
-            indices=target.working[found],
+            indices=found,
             points=target.original(mapped.points),
             confidence=np.clip(trust[first], 0.0, 1.0),
             method="points",

@@ -15,7 +15,9 @@ from nrdf.errors import CloudError, unknown_name
 from nrdf.geometry import bounding_box, thin
 from nrdf.scans.floor import Plane, find_floor
 
-STEPS = ("duplicates", "floor", "outliers", "objects")
+STEPS = ("thin", "duplicates", "floor", "outliers", "objects")
+MOST_POINTS = 200_000
+"""What a scan is thinned to, evenly; the field itself looks at far fewer."""
 WORKING_POINTS = 30_000
 """Points that decisions are made on; those between follow the nearest of them."""
 _NEIGHBOURS = 12
@@ -56,7 +58,8 @@ def clean_scan(
     skip: Collection[str] = (),
     minimum_points: int = 256,
 ) -> Cleaned:
-    """Leave out repeated points, the floor, outliers, and all objects but the largest.
+    """Thin a scan, and leave out repeated points, the floor, outliers, and all objects but the
+    largest.
 
     up: (3,) unit vector, None if unknown. skip: those of `STEPS` to leave out. Raises CloudError
     for an unknown step, or where fewer than `minimum_points` remain (naming the step that took
@@ -82,8 +85,12 @@ def clean_scan(
                 f"object in the scan? --skip {worst.name} leaves that step out"
             )
 
+    if "thin" not in skip:
+        mask = np.zeros(len(kept), bool)
+        mask[thin(scan.points, MOST_POINTS, rng)] = True
+        keep("thin", mask, f"{MOST_POINTS} points, evenly spread, are enough")
     if "duplicates" not in skip:
-        mask = _first_of_equal(scan.points)
+        mask = _first_of_equal(scan.points[kept])
         keep("duplicates", mask, "the same coordinates as another point")
     if "floor" not in skip:
         floor = find_floor(scan.points[kept], up, rng)
@@ -161,8 +168,8 @@ def _objects(points: np.ndarray, up: np.ndarray | None) -> tuple[np.ndarray, np.
 def _with_what_is_above(
     places: np.ndarray, label: np.ndarray, up: np.ndarray, gap: float
 ) -> np.ndarray:
-    """Labels (n,) in which the largest object has taken over those that are mostly within its
-    outline, seen along `up` (3,)."""
+    """Labels (n,) in which the largest object has taken over those that reach into its outline,
+    seen along `up` (3,)."""
     axes = np.linalg.svd(up[None])[2][1:]
     flat = places @ axes.T
     while True:
@@ -173,7 +180,7 @@ def _with_what_is_above(
             return label
         hull = ConvexHull(own, qhull_options="QJ")
         outside = flat @ hull.equations[:, :2].T + hull.equations[:, 2]
-        within = np.bincount(label, outside.max(axis=1) < gap, len(sizes)) > 0.5 * sizes
+        within = np.bincount(label, outside.max(axis=1) < gap, len(sizes)) > 0
         within[largest] = False
         if not within.any():
             return label

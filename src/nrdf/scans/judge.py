@@ -8,10 +8,12 @@ sides; in a wrong one the field puts seats where backs are, off the surface.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import ModelError
@@ -32,6 +34,8 @@ _COARSE_TOLERANCE, _FINE_TOLERANCE = 0.05, 0.03
 _UNSEEN = 0.5  # weight of the prototypes' points: what they lie on may not have been seen
 _DEPTH = 0.02  # how far below and above the surface the field is asked for occupancy, canonical
 _DOUBT, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
+_USUAL_POINTS = 1024
+_LEAST_SPREAD = 0.15  # of the logarithm of proportions
 _BATCH = 36
 
 
@@ -46,22 +50,16 @@ class Judge:
         self.model = model
         given = list(prototypes) or family_prototypes(model.category)
         self.prototypes = len(given)
+        self._clouds = [model.embed(cloud) for cloud in given]
         described = []
         with torch.inference_mode():
-            for cloud in given:
-                embedded = model.embed(cloud)
-                chosen = thin(embedded.points, _FINE_POINTS, np.random.default_rng(0))
+            for cloud in self._clouds:
+                chosen = thin(cloud.points, _FINE_POINTS, np.random.default_rng(0))
                 chosen = np.random.default_rng(0).permutation(chosen)
-                points, normals = (
-                    model.tensor(values[chosen])[None]
-                    for values in (embedded.points, embedded.normals)
-                )
-                described.append(model.field.describe(embedded.z, points, normals))
+                points = model.tensor(cloud.points[chosen])[None]
+                normals = model.tensor(cloud.normals[chosen])[None]
+                described.append(model.field.describe(cloud.z, points, normals))
         self._k = torch.cat(described)  # (p, _FINE_POINTS, d_k)
-
-    @property
-    def usual_cost(self) -> float:
-        return 0.0
 
     def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Cost (h,) of h hypotheses: clouds (h, n, 3) in hypothesised canonical frames.
@@ -73,7 +71,7 @@ class Judge:
         for start in range(0, len(points), _BATCH):
             part = slice(start, start + _BATCH)
             q, n = self.model.tensor(points[part]), self.model.tensor(normals[part])
-            parts.append(self._explained(q, n, q, n, _COARSE_POINTS, _COARSE_TOLERANCE)[0])
+            parts.append(self._explained(q, n, q, n, _COARSE_POINTS, _COARSE_TOLERANCE)[0].mean(1))
         return torch.cat(parts).cpu().numpy()
 
     def fine(
@@ -85,21 +83,45 @@ class Judge:
         where it has one. Added are the error that the field expects of itself on the prototypes,
         and how far it is from finding matter just below the cloud's points and none above.
         """
+        return self._fine(points, normals, whole, whole_normals).mean(axis=1)
+
+    @cached_property
+    def usual_cost(self) -> float:
+        """The mean cost of each prototype, judged by the others: what is usual in the category."""
+        costs = []
+        for number, cloud in enumerate(self._clouds):
+            chosen = sparse_subset(cloud.points, _USUAL_POINTS)
+            points, normals = cloud.points[None, chosen], cloud.normals[None, chosen]
+            each = self._fine(points, normals, points, normals)[0]
+            costs.append(np.delete(each, number).mean() if self.prototypes > 1 else each.mean())
+        return float(np.mean(costs))
+
+    def strangeness(self, points: np.ndarray) -> float:
+        """How far the proportions of a canonical cloud (n, 3) are from the prototypes', in standard
+        deviations (root mean square over the axes)."""
+        known = np.array([_proportions(cloud.points) for cloud in self._clouds])
+        spread = np.maximum(known.std(axis=0), _LEAST_SPREAD)
+        return float(np.sqrt(np.mean(((_proportions(points) - known.mean(axis=0)) / spread) ** 2)))
+
+    def _fine(
+        self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray
+    ) -> np.ndarray:
+        """The cost of h hypotheses by each of p prototypes, (h, p)."""
         q, n, w, wn = (self.model.tensor(part) for part in (points, normals, whole, whole_normals))
         cost, inverse, z = self._explained(q, n, w, wn, _FINE_POINTS, _FINE_TOLERANCE)
         with torch.inference_mode():
             if inverse.log_error is not None:
-                cost = cost + _DOUBT * inverse.log_error.mean(1)
-            below, above = (
-                self.model.field.occupancy(z, q + _DEPTH * side * n) for side in (-1, 1)
-            )
-            wrong = torch.nn.functional.softplus(-below) + torch.nn.functional.softplus(above)
-            return (cost + _INSIDE * wrong.mean(1)).cpu().numpy()
+                doubt = inverse.log_error.unflatten(1, (self.prototypes, -1))
+                cost = cost + _DOUBT * doubt.mean(2)
+            below = self.model.field.occupancy(z, q - _DEPTH * n)
+            above = self.model.field.occupancy(z, q + _DEPTH * n)
+            wrong = functional.softplus(-below) + functional.softplus(above)
+            return (cost + _INSIDE * wrong.mean(1, keepdim=True)).cpu().numpy()
 
     def _explained(
         self, q: Tensor, n: Tensor, w: Tensor, wn: Tensor, count: int, tolerance: float
     ) -> tuple[Tensor, Inverse, Tensor]:
-        """Cost (h,) of clouds q, n (h, ., 3), embedded as w, wn; what C said; embeddings."""
+        """Cost (h, p) of clouds q, n (h, ., 3), embedded as w, wn; what C said; embeddings."""
         field, h = self.model.field, len(q)
         with torch.inference_mode():
             z = field.embed(w, wn)
@@ -117,7 +139,19 @@ class Judge:
                 (least / (least + tolerance**2)).mean(1)
                 for least in (square.amin(2), square.amin(1))
             )
-            return (there + _UNSEEN * back).view(h, -1).mean(1), inverse, z
+            return (there + _UNSEEN * back).view(h, -1), inverse, z
+
+
+def sparse_subset(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices (at most `count`,) of points that stand for all, the extreme ones included as far as
+    they fit, in random order."""
+    return np.random.default_rng(0).permutation(encoder_subset(points, count))[:count]
+
+
+def _proportions(points: np.ndarray) -> np.ndarray:
+    """Logarithms (3,) of the bounding box's sides, their mean taken off."""
+    sides = np.log(np.maximum(np.ptp(points, axis=0), 1e-3))
+    return sides - sides.mean()
 
 
 def family_prototypes(category: str) -> list[PointCloud]:
@@ -134,8 +168,3 @@ def family_prototypes(category: str) -> list[PointCloud]:
         surface = family.member(seed).sample_surface(2048, rng)
         found.append(PointCloud(surface.points, surface.normals))
     return found
-
-
-def judged_subset(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of the points that hypotheses are judged by, in random order."""
-    return np.random.default_rng(0).permutation(encoder_subset(points, count))

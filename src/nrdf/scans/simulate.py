@@ -170,4 +170,8 @@ def _cast(
         vertices, faces, origin, np.asfortranarray(rays)
     )
     missed = np.asarray(face) < 0
-    return np.asarray(face), np.where(missed, np.inf, depth), np.nan_to_num(weights)
+    return (
+        np.asarray(face),
+        np.where(missed, np.inf, depth),
+        np.where(missed[:, None], 0.0, weights),
+    )

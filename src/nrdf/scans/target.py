@@ -10,14 +10,19 @@ import numpy as np
 from nrdf.cloud import PointCloud, in_metres
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
+from nrdf.regions.model import Model
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan
 from nrdf.scans.judge import Judge
-from nrdf.similarity import Similarity
+from nrdf.similarity import Similarity, up_axis
 from nrdf.units import METRES, Unit, find_unit
 
-_FOREIGN = 0.8  # cost above the usual one from which an object is not of the category
-_MIRRORED = 0.5  # symmetry from which the field is shown the mirror image too
+# On the test shapes, whole and in single views, these tell chairs, cars and aircraft apart.
+_FOREIGN = 0.5  # cost above the usual one from which an object is not of the category
+_STRANGEST = 1.65  # standard deviations of the proportions, likewise
+_ONE_SIDED = (0.5, 0.9)
+"""Symmetry between which the field is shown the mirror image too: the plane is trusted, and what
+one of its sides shows the other one lacks."""
 
 
 @dataclass(frozen=True)
@@ -30,26 +35,44 @@ class AlignedScan:
     alignment: Alignment
     unit: Unit
 
+    @property
+    def pose(self) -> Similarity:
+        """The likeliest pose: from canonical coordinates to the scan's."""
+        return self.alignment.best.pose
+
     def embed(self) -> Embedded:
-        """The object as the model's field sees it, in the likeliest pose."""
-        best = self.alignment.best
-        return self.judge.model.embed(self.cleaned.cloud, best.pose, best.symmetry > _MIRRORED)
+        """The object as the model's field sees it, in the likeliest pose.
+
+        Sheets whose side nothing tells stand for both (`Embedded.two_sided`).
+        """
+        seen = self.judge.model.embed(self.cleaned.cloud, self.pose, self._is_one_sided)
+        return seen.two_sided()
 
     def embed_in_metres(self, unit: str) -> Embedded:
         """As `embed`, of the object in metres, its scan being in `unit`."""
-        best = self.alignment.best
-        pose = best.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
+        pose = self.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
         cloud = in_metres(self.cleaned.cloud, unit)
-        return self.judge.model.embed(cloud, pose, best.symmetry > _MIRRORED)
+        return self.judge.model.embed(cloud, pose, self._is_one_sided)
+
+    @property
+    def _is_one_sided(self) -> bool:
+        low, high = _ONE_SIDED
+        return low < self.alignment.best.symmetry < high
 
     def in_scan(self, match: Match) -> Match:
         """A match on the object, its indices those of the scan's points."""
         return replace(match, indices=self.cleaned.kept[match.indices])
 
     @property
+    def strangeness(self) -> float:
+        """How far the object's proportions are from the category's, in standard deviations."""
+        return self.judge.strangeness(self.pose.to_canonical(self.cleaned.cloud.points))
+
+    @property
     def fits(self) -> bool:
         """Whether the object looks like one of the category at all."""
-        return self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+        explained = self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+        return explained and self.strangeness < _STRANGEST
 
     @property
     def doubts(self) -> list[str]:
@@ -64,7 +87,8 @@ class AlignedScan:
         if not self.fits:
             found.append(
                 f"the scan does not look like a {category}: the field explains it at a cost of "
-                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual"
+                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual, and its "
+                f"proportions are {self.strangeness:.1f} standard deviations off"
             )
         if self.alignment.is_ambiguous:
             degrees = [f"{np.degrees(c.yaw):.0f}°" for c in self.alignment.likely]
@@ -72,9 +96,35 @@ class AlignedScan:
                 f"the pose is ambiguous: yaws of {', '.join(degrees)} explain the scan about "
                 "equally; look at the picture, or scan more sides"
             )
+        if self.alignment.best.symmetry == 0:
+            found.append("no mirror plane was found, so yaw and scale are rough; scan more sides")
         if self.unit.doubt:
-            found.append(f"the unit may be wrong: {self.unit.doubt}")
+            known = "may be wrong" if self.unit.name else "is unknown"
+            found.append(f"the unit {known}: {self.unit.doubt}")
         return found
+
+
+def align(
+    model: Model,
+    scan: PointCloud,
+    up: str = "auto",
+    sensors: np.ndarray | None = None,
+    unit: str | None = None,
+    skip: Sequence[str] = (),
+    examples: Sequence[PointCloud] = (),
+) -> AlignedScan:
+    """Clean a scan of one object in any pose, and align it with the model's category.
+
+    up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
+    stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
+    leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
+    the category's family. For many scans, make one `Judge` and use `bring_in`.
+
+    Raises CloudError for a direction or step that is not known and where no object is left,
+    ModelError for a category without a family and no examples.
+    """
+    direction = None if up == "auto" else up_axis(up)
+    return bring_in(Judge(model, examples), scan, direction, sensors, unit, skip)
 
 
 def bring_in(

@@ -1,0 +1,33 @@
+"""A scan in any pose: simulated, cleaned, aligned, and a region found on it.
+
+python examples/06_scan_in_any_pose.py
+"""
+
+import numpy as np
+
+import nrdf
+from nrdf.bundled import bundled_chair
+from nrdf.scans.simulate import ScanSettings, simulate_scan
+from nrdf.shapes.families import get_family
+from nrdf.shapes.families.tessellation import tessellate
+from nrdf.similarity import Similarity, about_up, up_axis, upright
+
+# Three depth cameras around a chair of 0.9 m that stands on a floor, z up, turned by 2 rad.
+mesh = tessellate(get_family("chair").member(1_000_003))  # vertices (v, 3), faces (f, 3)
+pose = Similarity(upright(up_axis("z")) @ about_up(2.0), np.array([4.0, -1.0, 0.4]), 0.9)
+settings = ScanSettings(views=3, noise=0.001, floor=True)
+seen = simulate_scan(mesh.vertices, mesh.faces, settings, np.random.default_rng(0), pose)
+
+model = nrdf.load_model("chair")
+aligned = nrdf.align(model, seen.cloud, up="z")
+for step in aligned.cleaned.steps:
+    print(f"{step.name:10s} {step.removed:6d} points removed: {step.note}")
+print("T_scan_canonical\n", aligned.pose.T_scan_canonical.round(3))
+print(f"longest side {aligned.pose.scale:.3f} {aligned.unit.name} ({aligned.unit.origin})")
+print("\n".join(aligned.doubts) or "no doubts")
+
+reference, regions = bundled_chair("reference")
+matches = model.set_reference(reference).retrieve_all(regions, aligned.embed())
+for name, match in matches.items():
+    match = aligned.in_scan(match)  # indices of the scan's own points
+    print(f"{name:11s} {match.presence.reason or len(match.indices)}")
