@@ -19,6 +19,9 @@ from nrdf.process.toolpath import Segment
 
 _FACING = 0.2
 """Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
+# Lines are beside each other where they run the same way or back, within 30 degrees, and the region
+# goes on between them beyond doubt: its border is known to about half the points' spacing.
+_PARALLEL, _SURE, _LOOKS = np.cos(np.pi / 6), 0.5, 9
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,9 @@ def measure(
         s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
     ]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
-    track = _Track.along(contacts[:once], axes[:once], strategy.tool_radius_m / 4.0)
+    track = _Track.along(
+        contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
+    )
     inside = _inside(surface, region, patches, strategy.edge_margin_m)
     visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
     spacing = _line_spacing(patches, track, strategy.stepover_m)
@@ -148,8 +153,8 @@ def _inside(
 
 @dataclass(frozen=True)
 class _Track:
-    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3); walked (n,), m,
-    from the start, with a long step from line to line."""
+    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3), averaged over
+    a way to either side; walked (n,), m, from the start, with a long step from line to line."""
 
     places: np.ndarray
     axes: np.ndarray
@@ -158,7 +163,9 @@ class _Track:
     step: float
 
     @staticmethod
-    def along(contacts: list[np.ndarray], axes: list[np.ndarray], step: float) -> _Track:
+    def along(
+        contacts: list[np.ndarray], axes: list[np.ndarray], step: float, smooth: float
+    ) -> _Track:
         places, turned, travel, walked = [], [], [], []
         far = 0.0
         for line, axis in zip(contacts, axes, strict=True):
@@ -167,7 +174,7 @@ class _Track:
             fine = np.stack([np.interp(at, way, line[:, k]) for k in range(3)], axis=1)
             places.append(fine)
             turned.append(np.stack([np.interp(at, way, axis[:, k]) for k in range(3)], axis=1))
-            travel.append(travel_of(fine) if len(line) > 1 else np.zeros_like(fine))
+            travel.append(travel_of(fine, smooth) if len(line) > 1 else np.zeros_like(fine))
             walked.append(far + at)
             far += way[-1] + 1e3
         place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
@@ -193,40 +200,59 @@ class _Track:
 def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> np.ndarray:
     """Distances (k,), m, along the surface, from places of lines to the next lines beside them.
 
-    The nearest line to either side counts if the region goes on all the way to it, within one
-    patch. Neighbours are found in the patch's plane, and measured in space.
+    Square to the travel: the next line to either side counts if the region goes on all the way to
+    it, within one patch. What a place near a line's end would see aslant, past the end of the line
+    beside it, is no neighbour; a break in that line shows what is beyond. Neighbours are found in
+    the patch's plane, and measured in space.
     """
     owner, point, uv = locate(patches, track.places, -track.axes)
     found = [np.zeros(0)]
     for number, patch in enumerate(patches):
         mine = np.flatnonzero(owner == number)
-        if not len(mine):
-            continue
-        place, walked = uv[mine], track.walked[mine]
-        travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
-        gap = np.abs(np.diff(walked, prepend=-np.inf, append=np.inf)) > 2.0 * track.step
-        end = gap[1:] | gap[:-1]
-        tree = cKDTree(place)
-        pairs = tree.sparse_distance_matrix(tree, 2.5 * stepover, output_type="ndarray")
-        i, j, away = pairs["i"], pairs["j"], pairs["v"]
-        offset = place[j] - place[i]
-        beside = travel[i, 0] * offset[:, 1] - travel[i, 1] * offset[:, 0]
-        other = np.abs(walked[i] - walked[j]) > np.minimum(3.0 * away, 2.5 * stepover)
-        kept = other & (np.abs(beside) > 0.5 * away) & (away > 1e-9)
-        i, j, key = i[kept], j[kept], (2 * i + (beside > 0.0))[kept]
-        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
-        order = np.lexsort((chord, key))
-        _, first = np.unique(key[order], return_index=True)
-        i, j, chord = (values[order][first] for values in (i, j, chord))
-        # What goes on past a line's end is not beside it, and what is far off no neighbour.
-        whole = ~end[j] & (chord < 2.5 * stepover)
-        for share in (0.25, 0.5, 0.75):
-            whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
-        i, j, chord = i[whole], j[whole], chord[whole]
-        turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
-        half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
-        found.append(chord / np.sinc(half / np.pi))  # the arc over the chord
+        if len(mine):
+            travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
+            found.append(_beside(patch, track, mine, uv[mine], travel, stepover))
     return np.concatenate(found)
+
+
+def _beside(
+    patch: Patch,
+    track: _Track,
+    mine: np.ndarray,
+    place: np.ndarray,
+    travel: np.ndarray,
+    stepover: float,
+) -> np.ndarray:
+    """`_line_spacing` in one patch; mine: (n,) of the track's places; place, travel: (n, 2)."""
+    reach, walked = 2.5 * stepover, track.walked[mine]
+    tree = cKDTree(place)
+    pairs = tree.sparse_distance_matrix(tree, reach + track.step, output_type="ndarray")
+    i, j = pairs["i"], pairs["j"]
+    going_on = np.append(np.diff(walked) < 2.0 * track.step, False)
+    i, j = i[going_on[j]], j[going_on[j]]
+    # Where each step j of a line, to the place after it, crosses the square on the travel at i.
+    one, other = place[j] - place[i], place[j + 1] - place[i]
+    before, after = (np.einsum("pa,pa->p", way, travel[i]) for way in (one, other))
+    share = before / np.where(before == after, np.inf, before - after)
+    crossing = one + share[:, None] * (other - one)
+    side = travel[i, 0] * crossing[:, 1] - travel[i, 1] * crossing[:, 0]
+    away = np.linalg.norm(crossing, axis=1)
+    kept = (before * after <= 0.0) & (before != after) & (away < reach)
+    kept &= np.abs(walked[i] - walked[j]) > np.clip(3.0 * away, 2.0 * track.step, reach)
+    i, j, share, crossing, away = (v[kept] for v in (i, j, share, crossing, away))
+    key = 2 * i + (side[kept] > 0.0)
+    order = np.lexsort((away, key))
+    _, first = np.unique(key[order], return_index=True)
+    i, j, share, crossing = (v[order][first] for v in (i, j, share, crossing))
+    whole = np.abs(np.einsum("pa,pa->p", unit(travel[i]), unit(travel[j]))) > _PARALLEL
+    for part in np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]:
+        whole &= patch.border.distance(place[i] + part * crossing) > _SURE * patch.spacing
+    i, j, share = i[whole], j[whole], share[whole, None]
+    start, line = track.places[mine[i]], track.places[mine[j]]
+    chord = np.linalg.norm(line + share * (track.places[mine[j + 1]] - line) - start, axis=1)
+    turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
+    half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
+    return np.asarray(chord / np.sinc(half / np.pi))  # the arc over the chord
 
 
 def locate(

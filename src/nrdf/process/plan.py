@@ -24,6 +24,7 @@ Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_TOUCHES, _RESTS = 4, 2e-4  # rounds, and the distance (m) at which a contact counts as found
 _JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
 
 
@@ -220,12 +221,8 @@ def _on(
     places = np.concatenate(even)
     flat, along = patch.at(places)
     outward = unit(np.cross(along[:, 0], along[:, 1]))
-    contacts, normals, off = surface.nearest(flat, outward, 0.25)
-    normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
-    # Where thin parts are hardly sampled, there may be no surface under a place.
-    there = off < patch.spacing
+    contacts, normals, there = _touching(surface, flat, outward, patch.spacing, strategy)
     farthest = 2.0 * strategy.spacing_m + 0.5 * patch.spacing
-    jump = np.linalg.norm(np.diff(contacts, axis=0), axis=1) > farthest
     blocks, first = [], 0
     ends = iter(np.cumsum([len(line) for line in even]))
     for part in parts:
@@ -233,13 +230,42 @@ def _on(
         for _ in part:
             last = int(next(ends))
             found = first + np.flatnonzero(there[first:last])
-            cuts = (np.diff(found) > 1) | jump[found[:-1]]
-            runs = np.split(found, np.flatnonzero(cuts) + 1)
+            # A waypoint that is missing alone is no gap; a step too far is.
+            step = np.linalg.norm(np.diff(contacts[found], axis=0), axis=1)
+            runs = np.split(found, np.flatnonzero(step > farthest) + 1)
             block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
             first = last
         if block:
             blocks.append(block)
     return blocks
+
+
+def _touching(
+    surface: Surface, flat: np.ndarray, outward: np.ndarray, near: float, strategy: Strategy
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The contact (n, 3) of a tool with the surface at places (n, 3), at most `near` (m) from them.
+
+    Also the smooth normals there (n, 3), along which it stands, and whether there is any (n,).
+    outward: (n, 3), of the side that the places are on. Next to an edge the surface that faces the
+    tool may be another than the one that faces outward; the tool touches the former.
+    """
+    contacts, normals, off = surface.nearest(flat, outward, 0.25)
+    # Where thin parts are hardly sampled, there may be no surface under a place.
+    there = off < near
+    normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
+    moving = np.flatnonzero(there)
+    for _ in range(_TOUCHES):
+        found, _, off = surface.nearest(contacts[moving], normals[moving])
+        there[moving] = off < near
+        moved = (off > _RESTS) & there[moving]
+        moving = moving[moved]
+        if not len(moving):
+            break
+        contacts[moving] = found[moved]
+        normals[moving] = surface.smooth_normals(
+            contacts[moving], normals[moving], strategy.tool_radius_m
+        )
+    return contacts, normals, there
 
 
 def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:

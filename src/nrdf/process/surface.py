@@ -22,7 +22,7 @@ _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SHEETS = 6  # normals to start from
-_ROUNDS, _SETTLED = 12, 1e-2  # until nothing moves by more, in spacings or rad
+_ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
@@ -149,10 +149,12 @@ class Surface:
         near = self._nearest_to(points, 3 * _FITTED)
         fitted = np.zeros(len(points), bool)
         moving = np.arange(len(points))
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
             places, outward, fitted[moving] = self._fit(
                 points[moving], normals[moving], near[moving]
             )
+            if number >= _WHOLE:  # the whole turn leads to and fro between two sets of points
+                outward = unit(outward + normals[moving])
             moved = np.linalg.norm(places - points[moving], axis=1) > _SETTLED * self.spacing
             moved |= np.linalg.norm(outward - normals[moving], axis=1) > _SETTLED
             points[moving], normals[moving] = places, outward
@@ -167,10 +169,11 @@ class Surface:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step of `_settled`; near: (m, k) indices of the cloud points around."""
         distance, facing = self._seen(points, normals, near)
-        good = facing > _LEVEL
-        good &= np.cumsum(good, axis=1) <= _FITTED
-        reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
-        weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * (facing - _LEVEL)
+        # Shares fade to 0, or a place would find no rest where points come and go.
+        share = np.maximum(facing - _LEVEL, 0.0) / (1.0 - _LEVEL)
+        among = np.cumsum(share, axis=1) - share < _FITTED
+        reach = 1.05 * (distance * (among & (share > 0.0))).max(axis=1, keepdims=True) + 1e-12
+        weight = share * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
         fitted = (weight > 0).sum(axis=1) >= _LEAST
         # A place that no point is near is beyond the surface's edge.
         fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
@@ -202,6 +205,8 @@ class Surface:
         for _ in range(_ROUNDS):
             around = near[turning]
             distance, facing = self._seen(points[turning], normals[turning], around)
+            # Fades to 0 at the sheet's edge, so that the average finds its rest.
+            facing = np.maximum(facing - SAME_SIDE, 0.0)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
             mean = np.einsum("mk,mka->ma", weight, self.normals[around])
             found = np.where(weight.any(axis=1)[:, None], unit(mean), normals[turning])
@@ -223,9 +228,9 @@ class Surface:
         offset = self.points[near] - points[:, None]
         distance = np.sqrt(np.einsum("mka,mka->mk", offset, offset))
         facing = np.einsum("mka,ma->mk", self.normals[near], normals)
-        rise = np.abs(np.einsum("mka,ma->mk", offset, normals))
-        good = (facing > SAME_SIDE) & (rise < 0.6 * distance + self.spacing)
-        return distance, np.where(good, facing, 0.0)
+        rise = np.abs(np.einsum("mka,ma->mk", offset, normals)) / self.spacing
+        level = np.clip(3.0 + 1.5 * distance / self.spacing - 2.5 * rise, 0.0, 1.0)
+        return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
 
 
 def typical_spacing(distance: np.ndarray, number: int) -> float:
