@@ -6,22 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
-from nrdf.process.border import OWN
 from nrdf.process.frames import lean_rotation, surface_frames, travel_of
-from nrdf.process.patch import Patch, patches_of
+from nrdf.process.patch import inside_margin, patches_of
 from nrdf.process.plan import Strategy
-from nrdf.process.surface import Surface, unit
+from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
-
-_FACING = 0.2
-"""Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
-# Lines are beside each other where they run the same way or back, within 30 degrees, and the region
-# goes on between them beyond doubt: its border is known to about half the points' spacing.
-_PARALLEL, _SURE, _LOOKS = np.cos(np.pi / 6), 0.5, 9
+from nrdf.process.track import Track, line_spacing
 
 
 @dataclass(frozen=True)
@@ -67,12 +60,12 @@ def measure(
         s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
     ]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
-    track = _Track.along(
+    track = Track.along(
         contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
     )
-    inside = _inside(surface, region, patches, strategy.edge_margin_m)
+    inside = inside_margin(surface, region, patches, strategy.edge_margin_m)
     visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
-    spacing = _line_spacing(patches, track, strategy.stepover_m)
+    spacing = line_spacing(patches, track, strategy.stepover_m).distance
     off, wrong = _fit(surface, strategy, work, contacts)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
     return Measures(
@@ -136,142 +129,3 @@ def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float
             between += length
         end = segment.positions[-1]
     return process, between, time
-
-
-def _inside(
-    surface: Surface, region: np.ndarray, patches: Sequence[Patch], margin: float
-) -> np.ndarray:
-    """Indices of the region's points that are not in the margin along its border."""
-    inside = np.zeros(len(surface.points), bool)
-    inside[surface.indices(region)] = True
-    if margin > 0.0:
-        for patch in patches:
-            own = patch.label == OWN
-            inside[patch.index[own]] = patch.border.distance(patch.uv[own]) >= margin
-    return np.flatnonzero(inside)
-
-
-@dataclass(frozen=True)
-class _Track:
-    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3), averaged over
-    a way to either side; walked (n,), m, from the start, with a long step from line to line."""
-
-    places: np.ndarray
-    axes: np.ndarray
-    travel: np.ndarray
-    walked: np.ndarray
-    step: float
-
-    @staticmethod
-    def along(
-        contacts: list[np.ndarray], axes: list[np.ndarray], step: float, smooth: float
-    ) -> _Track:
-        places, turned, travel, walked = [], [], [], []
-        far = 0.0
-        for line, axis in zip(contacts, axes, strict=True):
-            way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-            at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / step)), 1) + 1)
-            fine = np.stack([np.interp(at, way, line[:, k]) for k in range(3)], axis=1)
-            places.append(fine)
-            turned.append(np.stack([np.interp(at, way, axis[:, k]) for k in range(3)], axis=1))
-            travel.append(travel_of(fine, smooth) if len(line) > 1 else np.zeros_like(fine))
-            walked.append(far + at)
-            far += way[-1] + 1e3
-        place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
-        return _Track(place, unit(axis), ahead, way, step)
-
-    def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
-        """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
-        if not len(points):
-            return np.zeros(0, int)
-        pairs = cKDTree(points).sparse_distance_matrix(
-            cKDTree(self.places), radius, output_type="ndarray"
-        )
-        point, place = pairs["i"], pairs["j"]
-        facing = -np.einsum("pa,pa->p", normals[point], self.axes[place]) > _FACING
-        point, place = point[facing], place[facing]
-        order = np.lexsort((place, point))
-        point, way = point[order], self.walked[place[order]]
-        new = np.ones(len(point), bool)
-        new[1:] = (point[1:] != point[:-1]) | (np.diff(way) > 2.5 * self.step)
-        return np.bincount(point[new], minlength=len(points))
-
-
-def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> np.ndarray:
-    """Distances (k,), m, along the surface, from places of lines to the next lines beside them.
-
-    Square to the travel: the next line to either side counts if the region goes on all the way to
-    it, within one patch. What a place near a line's end would see aslant, past the end of the line
-    beside it, is no neighbour; a break in that line shows what is beyond. Neighbours are found in
-    the patch's plane, and measured in space.
-    """
-    owner, point, uv = locate(patches, track.places, -track.axes)
-    found = [np.zeros(0)]
-    for number, patch in enumerate(patches):
-        mine = np.flatnonzero(owner == number)
-        if len(mine):
-            travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
-            found.append(_beside(patch, track, mine, uv[mine], travel, stepover))
-    return np.concatenate(found)
-
-
-def _beside(
-    patch: Patch,
-    track: _Track,
-    mine: np.ndarray,
-    place: np.ndarray,
-    travel: np.ndarray,
-    stepover: float,
-) -> np.ndarray:
-    """`_line_spacing` in one patch; mine: (n,) of the track's places; place, travel: (n, 2)."""
-    reach, walked = 2.5 * stepover, track.walked[mine]
-    tree = cKDTree(place)
-    pairs = tree.sparse_distance_matrix(tree, reach + track.step, output_type="ndarray")
-    i, j = pairs["i"], pairs["j"]
-    going_on = np.append(np.diff(walked) < 2.0 * track.step, False)
-    i, j = i[going_on[j]], j[going_on[j]]
-    # Where each step j of a line, to the place after it, crosses the square on the travel at i.
-    one, other = place[j] - place[i], place[j + 1] - place[i]
-    before, after = (np.einsum("pa,pa->p", way, travel[i]) for way in (one, other))
-    share = before / np.where(before == after, np.inf, before - after)
-    crossing = one + share[:, None] * (other - one)
-    side = travel[i, 0] * crossing[:, 1] - travel[i, 1] * crossing[:, 0]
-    away = np.linalg.norm(crossing, axis=1)
-    kept = (before * after <= 0.0) & (before != after) & (away < reach)
-    kept &= np.abs(walked[i] - walked[j]) > np.clip(3.0 * away, 2.0 * track.step, reach)
-    i, j, share, crossing, away = (v[kept] for v in (i, j, share, crossing, away))
-    key = 2 * i + (side[kept] > 0.0)
-    order = np.lexsort((away, key))
-    _, first = np.unique(key[order], return_index=True)
-    i, j, share, crossing = (v[order][first] for v in (i, j, share, crossing))
-    whole = np.abs(np.einsum("pa,pa->p", unit(travel[i]), unit(travel[j]))) > _PARALLEL
-    for part in np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]:
-        whole &= patch.border.distance(place[i] + part * crossing) > _SURE * patch.spacing
-    i, j, share = i[whole], j[whole], share[whole, None]
-    start, line = track.places[mine[i]], track.places[mine[j]]
-    chord = np.linalg.norm(line + share * (track.places[mine[j + 1]] - line) - start, axis=1)
-    turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
-    half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
-    return np.asarray(chord / np.sinc(half / np.pi))  # the arc over the chord
-
-
-def locate(
-    patches: Sequence[Patch], places: np.ndarray, tails: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The patch (n,) that each of `places` (n, 3) is on, the patch's point (n,) nearest to it, and
-    its uv (n, 2) there; tails: (n, 3) tells the side, that of the tool."""
-    best = np.full(len(places), np.inf)
-    owner, point = np.zeros(len(best), int), np.zeros(len(best), int)
-    uv = np.zeros((len(best), 2))
-    for number, patch in enumerate(patches):
-        own = np.flatnonzero(patch.label == OWN)
-        distance, near = cKDTree(patch.points[own]).query(places)
-        near = own[near]
-        # On a thin part the nearest patch is the one that faces the tool.
-        distance -= 3.0 * patch.spacing * np.einsum("na,na->n", patch.normals[near], tails)
-        offset = np.einsum("nba,na->nb", patch.tangents[near], places - patch.points[near])
-        closer = distance < best
-        best, owner = np.where(closer, distance, best), np.where(closer, number, owner)
-        point = np.where(closer, near, point)
-        uv = np.where(closer[:, None], patch.uv[near] + offset, uv)
-    return owner, point, uv
