@@ -11,8 +11,10 @@ from scipy.spatial import cKDTree
 from nrdf.process.lines import Line, touching
 from nrdf.process.patch import Patch
 from nrdf.process.surface import Surface, tangent_frames, unit
-from nrdf.process.track import line_spacing, track_of
+from nrdf.process.track import Neighbours, Track, line_spacing, track_of
 
+Way = tuple[np.ndarray, np.ndarray]
+"""Places (n, 3) near the surface, and the outward normal (3,) of its side there."""
 _NEARBY = 2.0  # radii from a line; what is farther off may not belong to the region
 _ALIKE = 0.7  # cosine between the normals of places that one line may work
 _WIDE = 1.12  # stepovers between lines that need another
@@ -41,11 +43,8 @@ def touch_up(
         visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
         left = wanted[visits == 0]
         near = cKDTree(track.places).query(surface.points[left])[0] < _NEARBY * radius_m
-        found = [
-            _line(surface, group, spacing_m, radius_m)
-            for group in _groups(surface, left[near], radius_m)
-        ]
-        new = [line for line in found if line is not None]
+        ways = [_along(surface, g, spacing_m) for g in _groups(surface, left[near], radius_m)]
+        new = _lines(surface, ways, surface.spacing, radius_m)
         if not new:
             break
         made += new
@@ -66,39 +65,43 @@ def fill_gaps(
         return made
     for _ in range(_ROUNDS):
         track = track_of([*lines, *made], radius_m, stepover_m)
-        found = line_spacing(patches, track, stepover_m)
-        wide = np.flatnonzero(found.distance > _WIDE * stepover_m)
-        wide = wide[np.argsort(found.place[wide], kind="stable")]
-        side = np.einsum(
-            "na,na->n",
-            np.cross(track.travel[found.place[wide]], track.axes[found.place[wide]]),
-            found.beside[wide] - track.places[found.place[wide]],
-        )
-        new: list[Line] = []
-        for one in (side > 0.0, side <= 0.0):
-            chosen = wide[one]
-            ends = np.flatnonzero(np.diff(found.place[chosen]) > 2) + 1
-            for run in np.split(chosen, ends):
-                at = found.place[run]
-                middle = 0.5 * (track.places[at] + found.beside[run])
-                # Two lines see the gap between them, each from its side.
-                done = np.concatenate([np.zeros((0, 3)), *(line.contacts for line in new)])
-                seen = cKDTree(done).query(middle)[0] < 0.4 * stepover_m if len(done) else None
-                if not len(run) or (seen is not None and seen.mean() > 0.5):
-                    continue
-                along = unit(track.travel[at[[0, -1]]])
-                reach = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
-                ends_m = middle[[0, -1]] + reach * np.array([[-1.0], [1.0]]) * along
-                places = _resampled(np.concatenate([ends_m[:1], middle, ends_m[1:]]), spacing_m)
-                facing = np.broadcast_to(-unit(track.axes[at].mean(axis=0)), places.shape)
-                near = max(surface.spacing, 0.5 * stepover_m)
-                contacts, normals, there = touching(surface, places, facing, near, radius_m)
-                if there.sum() > 1:
-                    new.append(Line(contacts[there], normals[there]))
+        ways = _between(track, line_spacing(patches, track, stepover_m), spacing_m, stepover_m)
+        new = _lines(surface, ways, max(surface.spacing, 0.5 * stepover_m), radius_m)
         if not new:
             break
         made += new
     return made
+
+
+def _between(
+    track: Track, neighbours: Neighbours, spacing_m: float, stepover_m: float
+) -> list[Way]:
+    """Ways through the middle of every gap that is too wide."""
+    wide = np.flatnonzero(neighbours.distance > _WIDE * stepover_m)
+    wide = wide[np.argsort(neighbours.place[wide], kind="stable")]
+    at = neighbours.place[wide]
+    right = np.cross(track.travel[at], track.axes[at])
+    side = np.einsum("na,na->n", right, neighbours.beside[wide] - track.places[at])
+    ways: list[Way] = []
+    for chosen in (wide[side > 0.0], wide[side <= 0.0]):
+        ends = np.flatnonzero(np.diff(neighbours.place[chosen]) > 2) + 1
+        for run in np.split(chosen, ends):
+            if not len(run):
+                continue
+            at = neighbours.place[run]
+            middle = 0.5 * (track.places[at] + neighbours.beside[run])
+            # Two lines see the gap between them, each from its side.
+            if ways:
+                seen = cKDTree(np.concatenate([way for way, _ in ways])).query(middle)[0]
+                if np.median(seen) < 0.4 * stepover_m:
+                    continue
+            longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
+            first, last = (
+                middle[[0, -1]] + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
+            )
+            way = _resampled(np.concatenate([first[None], middle, last[None]]), spacing_m)
+            ways.append((way, -unit(track.axes[at].mean(axis=0))))
+    return ways
 
 
 def _resampled(way: np.ndarray, spacing_m: float) -> np.ndarray:
@@ -123,8 +126,8 @@ def _groups(surface: Surface, left: np.ndarray, radius_m: float) -> list[np.ndar
     return [left[which == k] for k in range(count)]
 
 
-def _line(surface: Surface, group: np.ndarray, spacing_m: float, radius_m: float) -> Line | None:
-    """A line along the longest extent of points (k,); None where there is no surface for it."""
+def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
+    """A way along the longest extent of points (k,)."""
     points = surface.points[group]
     normal = unit(surface.normals[group].mean(axis=0))
     middle = points.mean(axis=0)
@@ -136,7 +139,16 @@ def _line(surface: Surface, group: np.ndarray, spacing_m: float, radius_m: float
     ahead = offset @ along
     half = max(0.5 * spacing_m, 0.5 * float(np.ptp(ahead)))
     at = np.linspace(-half, half, max(int(np.rint(2.0 * half / spacing_m)), 1) + 1)
-    places = middle + 0.5 * (ahead.min() + ahead.max()) * along + at[:, None] * along
-    facing = np.broadcast_to(normal, places.shape)
-    contacts, normals, there = touching(surface, places, facing, surface.spacing, radius_m)
-    return Line(contacts[there], normals[there]) if there.sum() > 1 else None
+    return middle + (0.5 * (ahead.min() + ahead.max()) + at[:, None]) * along, normal
+
+
+def _lines(surface: Surface, ways: Sequence[Way], near: float, radius_m: float) -> list[Line]:
+    """Ways brought onto the surface, those that have two waypoints there."""
+    if not ways:
+        return []
+    places = np.concatenate([way for way, _ in ways])
+    facing = np.concatenate([np.broadcast_to(normal, way.shape) for way, normal in ways])
+    contacts, normals, there = touching(surface, places, facing, near, radius_m)
+    cuts = np.cumsum([len(way) for way, _ in ways])[:-1]
+    parts = zip(*(np.split(v, cuts) for v in (contacts, normals, there)), strict=True)
+    return [Line(c[t], n[t]) for c, n, t in parts if t.sum() > 1]
