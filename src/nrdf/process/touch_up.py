@@ -18,6 +18,7 @@ Way = tuple[np.ndarray, np.ndarray]
 _NEARBY = 2.0  # radii from a line; what is farther off may not belong to the region
 _ALIKE = 0.7  # cosine between the normals of places that one line may work
 _WIDE = 1.12  # stepovers between lines that need another
+_SHORTEST = 0.2  # spacings of waypoints
 _ROUNDS = 3
 
 
@@ -95,7 +96,7 @@ def _between(
                 seen = cKDTree(np.concatenate([way for way, _ in ways])).query(middle)[0]
                 if np.median(seen) < 0.4 * stepover_m:
                     continue
-            longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
+            longer = 0.5 * max(_SHORTEST * spacing_m - float(np.ptp(track.walked[at])), 0.0)
             first, last = (
                 middle[[0, -1]] + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
             )
@@ -137,7 +138,7 @@ def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
         along = np.linalg.svd(offset, full_matrices=False)[2][0]
         along = unit(along - along @ normal * normal)
     ahead = offset @ along
-    half = max(0.5 * spacing_m, 0.5 * float(np.ptp(ahead)))
+    half = 0.5 * max(_SHORTEST * spacing_m, float(np.ptp(ahead)))
     at = np.linspace(-half, half, max(int(np.rint(2.0 * half / spacing_m)), 1) + 1)
     return middle + (0.5 * (ahead.min() + ahead.max()) + at[:, None]) * along, normal
 

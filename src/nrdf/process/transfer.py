@@ -9,7 +9,9 @@ A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any n
 
 from __future__ import annotations
 
+import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -34,6 +36,7 @@ from nrdf.regions.model import Model
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
+_THREADS = 4  # that plan: numpy leaves them little to do at once
 
 
 @dataclass(frozen=True)
@@ -136,10 +139,14 @@ class Teacher:
         way = Correspondence(self.reference, embedded)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
-        paths = tuple(
-            self._path(name, number, process, found[name], way)
-            for name, number, process in self.steps()
-        )
+        way.target.edges  # noqa: B018, what all paths share
+        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+            paths = tuple(
+                pool.map(
+                    lambda step: self._path(step[0], step[1], step[2], found[step[0]], way),
+                    self.steps(),
+                )
+            )
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [
