@@ -11,7 +11,7 @@ from nrdf.process.patch import Patch
 from nrdf.process.raster import Stroke
 from nrdf.process.surface import Surface, unit
 
-_TOUCHES, _RESTS = 2, 5e-4  # rounds, and the distance (m) at which a contact counts as found
+_TOUCHES, _RESTS = 4, 2e-4  # rounds, and the distance (m) at which a contact counts as found
 _JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
 
 

@@ -22,7 +22,7 @@ _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
-_ROUNDS, _WHOLE, _SETTLED = 12, 2, 1e-2  # until nothing moves by more, in spacings or rad
+_ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:

@@ -96,7 +96,7 @@ def _between(
                 seen = cKDTree(np.concatenate([way for way, _ in ways])).query(middle)[0]
                 if np.median(seen) < 0.4 * stepover_m:
                     continue
-            longer = 0.5 * max(_SHORTEST * spacing_m - float(np.ptp(track.walked[at])), 0.0)
+            longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
             first, last = (
                 middle[[0, -1]] + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
             )

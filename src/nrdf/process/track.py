@@ -88,7 +88,9 @@ def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Nei
 
     Square to the travel: the next line to either side counts if the region goes on all the way to
     it. What a place near a line's end would see aslant, past the end of the line beside it, is no
-    neighbour; a break in that line shows what is beyond. Neighbours are found in the patches'
+    neighbour; a break in that line shows what is beyond. Where another line comes nearer to the
+    middle of the way than either (round a corner, past a short break), twice its distance from
+    there counts. Neighbours are found in the patches'
     planes, and measured in space.
     """
     tails = -track.axes
@@ -151,13 +153,16 @@ def _beside(
     whole = np.abs(np.einsum("pa,pa->p", unit(travel[i]), unit(travel[j]))) > _PARALLEL
     for part in np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]:
         whole &= patch.border.distance(place[i] + part * crossing) > _SURE * patch.spacing
-    i, j, share = i[whole], j[whole], share[whole, None]
+    i, j, share, crossing = i[whole], j[whole], share[whole, None], crossing[whole]
     line = track.places[mine[j]]
     beside = line + share * (track.places[mine[j + 1]] - line)
     chord = np.linalg.norm(beside - track.places[mine[i]], axis=1)
     turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
     half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
-    return Neighbours(mine[i], beside, chord / np.sinc(half / np.pi))  # the arc over the chord
+    nearest = tree.query(place[i] + 0.5 * crossing)[0]
+    nearest /= np.maximum(np.linalg.norm(crossing, axis=1), 1e-12)
+    arc = chord / np.sinc(half / np.pi)
+    return Neighbours(mine[i], beside, arc * np.minimum(1.0, 2.0 * nearest))
 
 
 def _placed(
