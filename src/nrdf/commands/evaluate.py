@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from nrdf.benchmark.bsrc import Benchmark
     from nrdf.benchmark.evaluate import MethodResult
     from nrdf.benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
+    from nrdf.benchmark.transfer_speed import TransferSpeed
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
@@ -186,10 +187,10 @@ def bench(
     steps: int = 3,
     out: Path | None = None,
 ) -> None:
-    """Measure speed and memory of retrieval and training.
+    """Measure speed and memory of retrieval, transfer and training.
 
-    8 regions on a target of 8192 points without normals, the reference embedded before. Every
-    measurement runs in a process of its own.
+    8 regions on a target of 8192 points without normals, the reference embedded before; transfer
+    with the chairs' model. Every other measurement runs in a process of its own.
 
     Example: nrdf bench --out bench.json
 
@@ -201,14 +202,32 @@ def bench(
         out: JSON file to write.
     """
     from nrdf.benchmark.latency import measure, to_json
+    from nrdf.benchmark.transfer_speed import measure_transfer
     from nrdf.output import write_json
 
     with errors.status("measuring") as status:
         retrieval, training, failures = measure(preset, device, repeats, steps, status.update)
+        status.update("transfer")
+        transfer = measure_transfer(device, repeats)
     show_speeds(retrieval, training, failures)
+    show_transfer_speed(transfer)
     if out is not None:
-        write_json(out, {"versions": versions(), **to_json(retrieval, training, failures)})
+        content = {**to_json(retrieval, training, failures), "transfer": vars(transfer)}
+        write_json(out, {"versions": versions(), **content})
         console.print(f"wrote {out}")
+
+
+def show_transfer_speed(transfer: TransferSpeed) -> None:
+    """A table of a transfer's time by phase."""
+    from nrdf.benchmark.transfer_speed import TRANSFER_BAR_S
+
+    title = f"\ntransfer, {transfer.regions} regions, {transfer.points} points"
+    shown = table(title, "", "s", "must keep to")
+    shown.add_row("further targets, all files", f"{transfer.wall_s:.2f}", f"{TRANSFER_BAR_S:g}")
+    for phase, seconds in transfer.phases.items():
+        shown.add_row(f"  {phase}", f"{seconds:.2f}", "")
+    shown.add_row("CPU time, all threads", f"{transfer.cpu_s:.2f}", "")
+    show(shown)
 
 
 def show_speeds(

@@ -6,19 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
-from nrdf.process.border import OWN
 from nrdf.process.frames import lean_rotation, surface_frames, travel_of
-from nrdf.process.patch import Patch, patches_of
+from nrdf.process.patch import inside_margin, patches_of
 from nrdf.process.plan import Strategy
-from nrdf.process.surface import Surface, unit
+from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
-
-_FACING = 0.2
-"""Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
+from nrdf.process.track import Track, line_spacing
 
 
 @dataclass(frozen=True)
@@ -64,10 +60,12 @@ def measure(
         s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
     ]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
-    track = _Track.along(contacts[:once], axes[:once], strategy.tool_radius_m / 4.0)
-    inside = _inside(surface, region, patches, strategy.edge_margin_m)
+    track = Track.along(
+        contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
+    )
+    inside = inside_margin(surface, region, patches, strategy.edge_margin_m)
     visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
-    spacing = _line_spacing(patches, track, strategy.stepover_m)
+    spacing = line_spacing(patches, track, strategy.stepover_m).distance
     off, wrong = _fit(surface, strategy, work, contacts)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
     return Measures(
@@ -131,121 +129,3 @@ def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float
             between += length
         end = segment.positions[-1]
     return process, between, time
-
-
-def _inside(
-    surface: Surface, region: np.ndarray, patches: Sequence[Patch], margin: float
-) -> np.ndarray:
-    """Indices of the region's points that are not in the margin along its border."""
-    inside = np.zeros(len(surface.points), bool)
-    inside[surface.indices(region)] = True
-    if margin > 0.0:
-        for patch in patches:
-            own = patch.label == OWN
-            inside[patch.index[own]] = patch.border.distance(patch.uv[own]) >= margin
-    return np.flatnonzero(inside)
-
-
-@dataclass(frozen=True)
-class _Track:
-    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3); walked (n,), m,
-    from the start, with a long step from line to line."""
-
-    places: np.ndarray
-    axes: np.ndarray
-    travel: np.ndarray
-    walked: np.ndarray
-    step: float
-
-    @staticmethod
-    def along(contacts: list[np.ndarray], axes: list[np.ndarray], step: float) -> _Track:
-        places, turned, travel, walked = [], [], [], []
-        far = 0.0
-        for line, axis in zip(contacts, axes, strict=True):
-            way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-            at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / step)), 1) + 1)
-            fine = np.stack([np.interp(at, way, line[:, k]) for k in range(3)], axis=1)
-            places.append(fine)
-            turned.append(np.stack([np.interp(at, way, axis[:, k]) for k in range(3)], axis=1))
-            travel.append(travel_of(fine) if len(line) > 1 else np.zeros_like(fine))
-            walked.append(far + at)
-            far += way[-1] + 1e3
-        place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
-        return _Track(place, unit(axis), ahead, way, step)
-
-    def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
-        """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
-        if not len(points):
-            return np.zeros(0, int)
-        pairs = cKDTree(points).sparse_distance_matrix(
-            cKDTree(self.places), radius, output_type="ndarray"
-        )
-        point, place = pairs["i"], pairs["j"]
-        facing = -np.einsum("pa,pa->p", normals[point], self.axes[place]) > _FACING
-        point, place = point[facing], place[facing]
-        order = np.lexsort((place, point))
-        point, way = point[order], self.walked[place[order]]
-        new = np.ones(len(point), bool)
-        new[1:] = (point[1:] != point[:-1]) | (np.diff(way) > 2.5 * self.step)
-        return np.bincount(point[new], minlength=len(points))
-
-
-def _line_spacing(patches: Sequence[Patch], track: _Track, stepover: float) -> np.ndarray:
-    """Distances (k,), m, along the surface, from places of lines to the next lines beside them.
-
-    The nearest line to either side counts if the region goes on all the way to it, within one
-    patch. Neighbours are found in the patch's plane, and measured in space.
-    """
-    owner, point, uv = locate(patches, track.places, -track.axes)
-    found = [np.zeros(0)]
-    for number, patch in enumerate(patches):
-        mine = np.flatnonzero(owner == number)
-        if not len(mine):
-            continue
-        place, walked = uv[mine], track.walked[mine]
-        travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
-        gap = np.abs(np.diff(walked, prepend=-np.inf, append=np.inf)) > 2.0 * track.step
-        end = gap[1:] | gap[:-1]
-        tree = cKDTree(place)
-        pairs = tree.sparse_distance_matrix(tree, 2.5 * stepover, output_type="ndarray")
-        i, j, away = pairs["i"], pairs["j"], pairs["v"]
-        offset = place[j] - place[i]
-        beside = travel[i, 0] * offset[:, 1] - travel[i, 1] * offset[:, 0]
-        other = np.abs(walked[i] - walked[j]) > np.minimum(3.0 * away, 2.5 * stepover)
-        kept = other & (np.abs(beside) > 0.5 * away) & (away > 1e-9)
-        i, j, key = i[kept], j[kept], (2 * i + (beside > 0.0))[kept]
-        chord = np.linalg.norm(track.places[mine[j]] - track.places[mine[i]], axis=1)
-        order = np.lexsort((chord, key))
-        _, first = np.unique(key[order], return_index=True)
-        i, j, chord = (values[order][first] for values in (i, j, chord))
-        # What goes on past a line's end is not beside it, and what is far off no neighbour.
-        whole = ~end[j] & (chord < 2.5 * stepover)
-        for share in (0.25, 0.5, 0.75):
-            whole &= patch.border.distance((1.0 - share) * place[i] + share * place[j]) > 0.0
-        i, j, chord = i[whole], j[whole], chord[whole]
-        turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
-        half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
-        found.append(chord / np.sinc(half / np.pi))  # the arc over the chord
-    return np.concatenate(found)
-
-
-def locate(
-    patches: Sequence[Patch], places: np.ndarray, tails: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The patch (n,) that each of `places` (n, 3) is on, the patch's point (n,) nearest to it, and
-    its uv (n, 2) there; tails: (n, 3) tells the side, that of the tool."""
-    best = np.full(len(places), np.inf)
-    owner, point = np.zeros(len(best), int), np.zeros(len(best), int)
-    uv = np.zeros((len(best), 2))
-    for number, patch in enumerate(patches):
-        own = np.flatnonzero(patch.label == OWN)
-        distance, near = cKDTree(patch.points[own]).query(places)
-        near = own[near]
-        # On a thin part the nearest patch is the one that faces the tool.
-        distance -= 3.0 * patch.spacing * np.einsum("na,na->n", patch.normals[near], tails)
-        offset = np.einsum("nba,na->nb", patch.tangents[near], places - patch.points[near])
-        closer = distance < best
-        best, owner = np.where(closer, distance, best), np.where(closer, number, owner)
-        point = np.where(closer, near, point)
-        uv = np.where(closer[:, None], patch.uv[near] + offset, uv)
-    return owner, point, uv

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -134,6 +135,19 @@ def patches_of(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
     if key not in surface.patches:
         surface.patches[key] = _cut(surface, own)
     return surface.patches[key]
+
+
+def inside_margin(
+    surface: Surface, region: np.ndarray, patches: Sequence[Patch], margin: float
+) -> np.ndarray:
+    """Indices of the region's points that are not in the margin along its border."""
+    inside = np.zeros(len(surface.points), bool)
+    inside[surface.indices(region)] = True
+    if margin > 0.0:
+        for patch in patches:
+            own = patch.label == OWN
+            inside[patch.index[own]] = patch.border.distance(patch.uv[own]) >= margin
+    return np.flatnonzero(inside)
 
 
 def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -13,18 +13,21 @@ from scipy.spatial.transform import Rotation
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.contour import contour, spiral
 from nrdf.process.frames import lean_rotation, steady, surface_frames, travel_of
-from nrdf.process.patch import Patch, patches_of
+from nrdf.process.lines import Line, nearest_first, on_surface
+from nrdf.process.patch import Patch, inside_margin, patches_of
 from nrdf.process.raster import Stroke, raster
-from nrdf.process.surface import Surface, unit
+from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
-
-log = logging.getLogger(__name__)
+from nrdf.process.touch_up import fill_gaps, touch_up
+from nrdf.process.track import line_spacing, track_of
 
 Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
+RASTERS = ("raster", "cross-hatch")
+"""Trajectories of straight lines; rings and spirals follow the border, whose corners they round."""
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
-_JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
+_TRIES, _WIDE = 3, 1.1  # of lines that are more stepovers apart
 
 
 @dataclass(frozen=True)
@@ -79,39 +82,38 @@ class Strategy:
                 raise ProcessError(f"direction is {self.direction}; give 3 numbers, not all 0")
 
 
-@dataclass(frozen=True)
-class Line:
-    """A stroke on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
-
-    contacts: np.ndarray
-    normals: np.ndarray
-
-    def reversed(self) -> Line:
-        return Line(self.contacts[::-1], self.normals[::-1])
-
-
 def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segment, ...]:
     """Segments that work `region`, indices (k,) of the surface's points, in driving order.
 
     The region is cut into patches that lie flat without folds (`nrdf.process.patch`), and each into
-    lines. Every line has its approach, process and departure segments; an approach or retract
-    distance of 0 leaves its segments out. Raises ProcessError for a margin that leaves nothing of
-    the region, a stepover wider than it, or a direction that stands on it.
+    lines; what those leave out nearby has short lines of its own. Every line has its approach,
+    process and departure segments; an approach or retract distance of 0 leaves its segments out.
+    Raises ProcessError for a margin that leaves nothing of the region, a stepover wider than it, or
+    a direction that stands on it.
     """
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
-    blocks: list[list[Line]] = []
+    lines: list[Line] = []
     for sweep in _sweeps(patches, strategy):
-        found = [block for patch, parts in sweep for block in _on(surface, patch, parts, strategy)]
-        blocks += _nearest_first(found)
-    if not blocks:
+        found = [
+            block for patch, strokes in sweep for block in _even(surface, patch, strokes, strategy)
+        ]
+        drawn = [line for block in nearest_first(found) for line in block]
+        lines += drawn
+        if strategy.trajectory in RASTERS:
+            reach, apart = strategy.tool_radius_m, strategy.stepover_m
+            lines += fill_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
+    if not lines:
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
             f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
             f"innermost place is {deepest:.3g} m from its border; give less than that"
         )
-    contacts = [line.contacts for block in blocks for line in block]
-    normals = [line.normals for block in blocks for line in block]
+    wanted = inside_margin(surface, region, patches, strategy.edge_margin_m)
+    lines += touch_up(
+        surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
+    )
+    contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
     return drive(_held(contacts, normals, strategy), normals, strategy)
 
 
@@ -165,22 +167,54 @@ def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
 
 def _sweeps(
     patches: Sequence[Patch], strategy: Strategy
-) -> list[list[tuple[Patch, list[list[Stroke]]]]]:
-    """For each sweep over the region, every patch's strokes by its connected parts."""
-    stepover, margin = strategy.stepover_m, strategy.edge_margin_m
-    if strategy.trajectory == "contour":
-        return [[(patch, contour(patch, stepover, margin)) for patch in patches]]
-    if strategy.trajectory == "spiral":
-        return [[(patch, spiral(patch, stepover, margin)) for patch in patches]]
+) -> list[list[tuple[Patch, Callable[[float], list[list[Stroke]]]]]]:
+    """For each sweep over the region, every patch with its strokes, by parts, at a stepover."""
+    margin = strategy.edge_margin_m
+    if strategy.trajectory in ("contour", "spiral"):
+        way = contour if strategy.trajectory == "contour" else spiral
+        return [[(patch, partial(way, patch, margin_m=margin)) for patch in patches]]
     angles = _angles(patches, strategy.direction)
     turns = (0.0, np.pi / 2) if strategy.trajectory == "cross-hatch" else (0.0,)
     return [
         [
-            (patch, raster(patch, angle + turn, stepover, margin))
+            (patch, partial(raster, patch, angle + turn, margin_m=margin))
             for patch, angle in zip(patches, angles, strict=True)
         ]
         for turn in turns
     ]
+
+
+def _even(
+    surface: Surface,
+    patch: Patch,
+    strokes: Callable[[float], list[list[Stroke]]],
+    strategy: Strategy,
+) -> list[list[Line]]:
+    """Blocks of lines on a patch, nowhere much farther apart than a stepover.
+
+    On few points, or round an edge, the patch's plane tells distances along the surface less well
+    than lines that are there: if they are too far apart, they are drawn again, closer.
+    """
+    wanted = stepover = strategy.stepover_m
+    best, least = [], np.inf
+    for _ in range(_TRIES):
+        blocks = on_surface(
+            surface, patch, strokes(stepover), strategy.spacing_m, strategy.tool_radius_m
+        )
+        lines = [line for block in blocks for line in block]
+        if not lines:
+            break
+        track = track_of(lines, strategy.tool_radius_m, wanted)
+        apart = line_spacing([patch], track, wanted).distance
+        wide = float((apart > _WIDE * wanted).mean()) if len(apart) else 0.0
+        if wide < least:
+            best, least = blocks, wide
+        # Where but a few places are too far from the next line, the line is broken there.
+        usual = float(np.quantile(apart, 0.9)) if len(apart) else 0.0
+        if wide == 0.0 or usual <= wanted or strategy.trajectory not in RASTERS:
+            break
+        stepover *= max(wanted / usual, 0.75)
+    return best
 
 
 def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[float]:
@@ -198,67 +232,6 @@ def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[floa
         angle if share >= LEAST_IN_SURFACE else other
         for (angle, share), other in zip(seen, longest, strict=True)
     ]
-
-
-def _on(
-    surface: Surface, patch: Patch, parts: Sequence[Sequence[Stroke]], strategy: Strategy
-) -> list[list[Line]]:
-    """Strokes brought onto the surface, their waypoints evenly spaced: a block of lines a part."""
-    strokes = [stroke for part in parts for stroke in part]
-    if not strokes:
-        return []
-    cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
-    even = []
-    flat = patch.at(np.concatenate(strokes))[0]
-    for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
-        plane = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
-        steps = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1), _JUMP * plane)
-        walked = np.concatenate([[0.0], np.cumsum(steps)])
-        count = max(int(np.rint(walked[-1] / strategy.spacing_m)), 1)
-        at = np.linspace(0.0, walked[-1], count + 1)
-        even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
-    places = np.concatenate(even)
-    flat, along = patch.at(places)
-    outward = unit(np.cross(along[:, 0], along[:, 1]))
-    contacts, normals, off = surface.nearest(flat, outward, 0.25)
-    normals = surface.smooth_normals(contacts, normals, strategy.tool_radius_m)
-    # Where thin parts are hardly sampled, there may be no surface under a place.
-    there = off < patch.spacing
-    farthest = 2.0 * strategy.spacing_m + 0.5 * patch.spacing
-    jump = np.linalg.norm(np.diff(contacts, axis=0), axis=1) > farthest
-    blocks, first = [], 0
-    ends = iter(np.cumsum([len(line) for line in even]))
-    for part in parts:
-        block = []
-        for _ in part:
-            last = int(next(ends))
-            found = first + np.flatnonzero(there[first:last])
-            cuts = (np.diff(found) > 1) | jump[found[:-1]]
-            runs = np.split(found, np.flatnonzero(cuts) + 1)
-            block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
-            first = last
-        if block:
-            blocks.append(block)
-    return blocks
-
-
-def _nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
-    """Blocks of lines ordered, and driven forwards or backwards, so that ways between are short."""
-    waiting, ordered = list(blocks), []
-    place: np.ndarray | None = None
-    while waiting:
-        if place is None:
-            block = waiting.pop(0)
-        else:
-            ends = np.array([[b[0].contacts[0], b[-1].contacts[-1]] for b in waiting])
-            away = np.linalg.norm(ends - place, axis=2)
-            which, end = np.unravel_index(np.argmin(away), away.shape)
-            block = waiting.pop(int(which))
-            if end == 1:
-                block = [line.reversed() for line in block[::-1]]
-        ordered.append(block)
-        place = block[-1].contacts[-1]
-    return ordered
 
 
 def _segments(

@@ -21,8 +21,8 @@ SAME_SIDE = 0.5
 _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
-_SHEETS = 6  # normals to start from
-_ROUNDS, _SETTLED = 12, 1e-2  # until nothing moves by more, in spacings or rad
+_SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
+_ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
@@ -123,23 +123,34 @@ class Surface:
 
         Returns places (m, 3), the surface's normals there (m, 3), distances (m,), m. As `project`,
         but at an edge there are several sheets, each found from a normal of its own, of which the
-        nearest counts; a first one at less than `near_enough` spacings is taken at once. Where
+        nearest counts; one at less than `near_enough` spacings is taken at once. Where
         there is no surface around, the distance is infinite.
         """
         points, normals = np.asarray(points, dtype=np.float64), unit(normals)
-        places, outward = points.copy(), normals.copy()
-        best = np.full(len(points), np.inf)
-        near = self._nearest_to(points, _SHEETS)
-        for start in (normals, *np.moveaxis(self.normals[near], 1, 0)):
-            facing = np.einsum("ma,ma->m", start, normals) > 0.2
-            asked = np.flatnonzero(facing & (best > near_enough * self.spacing))
-            found, turned, fitted = self._settled(points[asked], start[asked])
-            off = np.where(fitted, np.linalg.norm(found - points[asked], axis=1), np.inf)
-            closer = off < best[asked]
-            which = asked[closer]
-            places[which], outward[which] = found[closer], turned[closer]
-            best[which] = off[closer]
+        places, outward, best = self._found(points, normals)
+        # What is not near enough tries the normals around, those that differ.
+        poor = np.flatnonzero(best > near_enough * self.spacing)
+        around = self.normals[self._nearest_to(points[poor], _SHEETS)]
+        starts = np.concatenate([normals[poor, None], around], axis=1)
+        cosine = np.einsum("mka,mla->mkl", starts, starts)
+        earlier = np.tril(np.ones(cosine.shape[1:], bool), -1)
+        new = (cosine[:, :, 0] > 0.2) & ((cosine < _OTHER) | ~earlier).all(axis=2)
+        new[:, 0] = False
+        which, start = np.nonzero(new)
+        found, turned, off = self._found(points[poor[which]], starts[which, start])
+        order = np.lexsort((off, which))
+        which, first = np.unique(which[order], return_index=True)
+        closer = off[order][first] < best[poor[which]]
+        into, chosen = poor[which[closer]], order[first[closer]]
+        places[into], outward[into], best[into] = found[chosen], turned[chosen], off[chosen]
         return places, outward, best
+
+    def _found(
+        self, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places and normals as of `project`, and how far they are: infinitely without surface."""
+        found, turned, fitted = self._settled(points, normals)
+        return found, turned, np.where(fitted, np.linalg.norm(found - points, axis=1), np.inf)
 
     def _settled(
         self, points: np.ndarray, normals: np.ndarray
@@ -149,10 +160,12 @@ class Surface:
         near = self._nearest_to(points, 3 * _FITTED)
         fitted = np.zeros(len(points), bool)
         moving = np.arange(len(points))
-        for _ in range(_ROUNDS):
+        for number in range(_ROUNDS):
             places, outward, fitted[moving] = self._fit(
                 points[moving], normals[moving], near[moving]
             )
+            if number >= _WHOLE:  # the whole turn leads to and fro between two sets of points
+                outward = unit(outward + normals[moving])
             moved = np.linalg.norm(places - points[moving], axis=1) > _SETTLED * self.spacing
             moved |= np.linalg.norm(outward - normals[moving], axis=1) > _SETTLED
             points[moving], normals[moving] = places, outward
@@ -167,10 +180,11 @@ class Surface:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """One step of `_settled`; near: (m, k) indices of the cloud points around."""
         distance, facing = self._seen(points, normals, near)
-        good = facing > _LEVEL
-        good &= np.cumsum(good, axis=1) <= _FITTED
-        reach = 1.05 * (distance * good).max(axis=1, keepdims=True) + 1e-12
-        weight = good * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2 * (facing - _LEVEL)
+        # Shares fade to 0, or a place would find no rest where points come and go.
+        share = np.maximum(facing - _LEVEL, 0.0) / (1.0 - _LEVEL)
+        among = np.cumsum(share, axis=1) - share < _FITTED
+        reach = 1.05 * (distance * (among & (share > 0.0))).max(axis=1, keepdims=True) + 1e-12
+        weight = share * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
         fitted = (weight > 0).sum(axis=1) >= _LEAST
         # A place that no point is near is beyond the surface's edge.
         fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
@@ -202,6 +216,8 @@ class Surface:
         for _ in range(_ROUNDS):
             around = near[turning]
             distance, facing = self._seen(points[turning], normals[turning], around)
+            # Fades to 0 at the sheet's edge, so that the average finds its rest.
+            facing = np.maximum(facing - SAME_SIDE, 0.0)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
             mean = np.einsum("mk,mka->ma", weight, self.normals[around])
             found = np.where(weight.any(axis=1)[:, None], unit(mean), normals[turning])
@@ -223,9 +239,9 @@ class Surface:
         offset = self.points[near] - points[:, None]
         distance = np.sqrt(np.einsum("mka,mka->mk", offset, offset))
         facing = np.einsum("mka,ma->mk", self.normals[near], normals)
-        rise = np.abs(np.einsum("mka,ma->mk", offset, normals))
-        good = (facing > SAME_SIDE) & (rise < 0.6 * distance + self.spacing)
-        return distance, np.where(good, facing, 0.0)
+        rise = np.abs(np.einsum("mka,ma->mk", offset, normals)) / self.spacing
+        level = np.clip(3.0 + 1.5 * distance / self.spacing - 2.5 * rise, 0.0, 1.0)
+        return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
 
 
 def typical_spacing(distance: np.ndarray, number: int) -> float:

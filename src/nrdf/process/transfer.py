@@ -9,8 +9,10 @@ A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any n
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -38,6 +40,7 @@ from nrdf.similarity import Similarity
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
+_THREADS = 4  # that plan: numpy leaves them little to do at once
 
 
 @dataclass(frozen=True)
@@ -149,11 +152,18 @@ class Teacher:
         way = Correspondence(self.reference, embedded)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
+        way.target.edges  # noqa: B018, what all paths share
         steps, paths = self.steps(), []
-        for done, (name, number, process) in enumerate(steps):
-            if progress is not None:
-                progress(done + 1, len(steps) + 1)
-            paths.append(self._path(name, number, process, found[name], way))
+        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+            planned = [pool.submit(self._path, *step, found[step[0]], way) for step in steps]
+            try:
+                for done, path in enumerate(planned):
+                    if progress is not None:
+                        progress(done + 1, len(steps) + 1)
+                    paths.append(path.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [

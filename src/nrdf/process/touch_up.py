@@ -1,0 +1,155 @@
+"""Short lines where a region's others leave something out: points, or a gap between two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from nrdf.process.lines import Line, touching
+from nrdf.process.patch import Patch
+from nrdf.process.surface import Surface, tangent_frames, unit
+from nrdf.process.track import Neighbours, Track, line_spacing, track_of
+
+Way = tuple[np.ndarray, np.ndarray]
+"""Places (n, 3) near the surface, and the outward normal (3,) of its side there."""
+_NEARBY = 2.0  # radii from a line; what is farther off may not belong to the region
+_ALIKE = 0.7  # cosine between the normals of places that one line may work
+_WIDE = 1.12  # stepovers between lines that need another
+_SHORTEST = 0.2  # spacings of waypoints
+_ROUNDS = 3
+
+
+def touch_up(
+    surface: Surface,
+    wanted: np.ndarray,
+    lines: Sequence[Line],
+    spacing_m: float,
+    radius_m: float,
+    stepover_m: float,
+) -> list[Line]:
+    """Lines over those of the points `wanted` (k,) that a tool does not reach along `lines`.
+
+    The border of a region is ragged, and at its corners a few points may stand alone on a face of
+    their own. Points within two radii of a line that are next to each other share a line, along
+    their longest extent. Points farther off stay as they are, and so do stripes between lines that
+    are wanted farther apart than the tool is wide.
+    """
+    reach = max(radius_m, 0.55 * stepover_m)
+    made: list[Line] = []
+    for _ in range(_ROUNDS):
+        track = track_of([*lines, *made], radius_m, stepover_m)
+        visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
+        left = wanted[visits == 0]
+        near = cKDTree(track.places).query(surface.points[left])[0] < _NEARBY * radius_m
+        ways = [_along(surface, g, spacing_m) for g in _groups(surface, left[near], radius_m)]
+        new = _lines(surface, ways, surface.spacing, radius_m)
+        if not new:
+            break
+        made += new
+    return made
+
+
+def fill_gaps(
+    surface: Surface,
+    patches: Sequence[Patch],
+    lines: Sequence[Line],
+    spacing_m: float,
+    radius_m: float,
+    stepover_m: float,
+) -> list[Line]:
+    """Lines half-way between those that are too far apart: beside breaks, and at patches' seams."""
+    made: list[Line] = []
+    if not lines:
+        return made
+    for _ in range(_ROUNDS):
+        track = track_of([*lines, *made], radius_m, stepover_m)
+        ways = _between(track, line_spacing(patches, track, stepover_m), spacing_m, stepover_m)
+        new = _lines(surface, ways, max(surface.spacing, 0.5 * stepover_m), radius_m)
+        if not new:
+            break
+        made += new
+    return made
+
+
+def _between(
+    track: Track, neighbours: Neighbours, spacing_m: float, stepover_m: float
+) -> list[Way]:
+    """Ways through the middle of every gap that is too wide."""
+    wide = np.flatnonzero(neighbours.distance > _WIDE * stepover_m)
+    wide = wide[np.argsort(neighbours.place[wide], kind="stable")]
+    at = neighbours.place[wide]
+    right = np.cross(track.travel[at], track.axes[at])
+    side = np.einsum("na,na->n", right, neighbours.beside[wide] - track.places[at])
+    ways: list[Way] = []
+    for chosen in (wide[side > 0.0], wide[side <= 0.0]):
+        ends = np.flatnonzero(np.diff(neighbours.place[chosen]) > 2) + 1
+        for run in np.split(chosen, ends):
+            if not len(run):
+                continue
+            at = neighbours.place[run]
+            middle = 0.5 * (track.places[at] + neighbours.beside[run])
+            # Two lines see the gap between them, each from its side.
+            if ways:
+                seen = cKDTree(np.concatenate([way for way, _ in ways])).query(middle)[0]
+                if np.median(seen) < 0.4 * stepover_m:
+                    continue
+            longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
+            first, last = (
+                middle[[0, -1]] + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
+            )
+            way = _resampled(np.concatenate([first[None], middle, last[None]]), spacing_m)
+            ways.append((way, -unit(track.axes[at].mean(axis=0))))
+    return ways
+
+
+def _resampled(way: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Places (m, 3) evenly along a way (n, 3)."""
+    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
+    at = np.linspace(0.0, walked[-1], max(int(np.rint(walked[-1] / spacing_m)), 1) + 1)
+    return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1)
+
+
+def _groups(surface: Surface, left: np.ndarray, radius_m: float) -> list[np.ndarray]:
+    """Points (k,) by those that face the same way and are next to each other."""
+    if not len(left):
+        return []
+    points, normals = surface.points[left], surface.normals[left]
+    next_to = cKDTree(points).sparse_distance_matrix(
+        cKDTree(points), radius_m, output_type="coo_matrix"
+    )
+    alike = np.einsum("ea,ea->e", normals[next_to.row], normals[next_to.col]) > _ALIKE
+    next_to.data = alike.astype(float)
+    next_to.eliminate_zeros()
+    count, which = connected_components(next_to, directed=False)
+    return [left[which == k] for k in range(count)]
+
+
+def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
+    """A way along the longest extent of points (k,)."""
+    points = surface.points[group]
+    normal = unit(surface.normals[group].mean(axis=0))
+    middle = points.mean(axis=0)
+    offset = points - middle
+    along = tangent_frames(normal[None])[0, 0]
+    if len(group) > 1:
+        along = np.linalg.svd(offset, full_matrices=False)[2][0]
+        along = unit(along - along @ normal * normal)
+    ahead = offset @ along
+    half = 0.5 * max(_SHORTEST * spacing_m, float(np.ptp(ahead)))
+    at = np.linspace(-half, half, max(int(np.rint(2.0 * half / spacing_m)), 1) + 1)
+    return middle + (0.5 * (ahead.min() + ahead.max()) + at[:, None]) * along, normal
+
+
+def _lines(surface: Surface, ways: Sequence[Way], near: float, radius_m: float) -> list[Line]:
+    """Ways brought onto the surface, those that have two waypoints there."""
+    if not ways:
+        return []
+    places = np.concatenate([way for way, _ in ways])
+    facing = np.concatenate([np.broadcast_to(normal, way.shape) for way, normal in ways])
+    contacts, normals, there = touching(surface, places, facing, near, radius_m)
+    cuts = np.cumsum([len(way) for way, _ in ways])[:-1]
+    parts = zip(*(np.split(v, cuts) for v in (contacts, normals, there)), strict=True)
+    return [Line(c[t], n[t]) for c, n, t in parts if t.sum() > 1]
