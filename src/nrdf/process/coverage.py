@@ -65,7 +65,7 @@ def measure(
     ]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
     track = _Track.along(contacts[:once], axes[:once], strategy.tool_radius_m / 4.0)
-    inside = _inside(surface, region, patches, strategy.edge_margin_m)
+    inside = inside_margin(surface, region, patches, strategy.edge_margin_m)
     visits = track.visits(surface.points[inside], surface.normals[inside], strategy.tool_radius_m)
     spacing = _line_spacing(patches, track, strategy.stepover_m)
     off, wrong = _fit(surface, strategy, work, contacts)
@@ -133,7 +133,7 @@ def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float
     return process, between, time
 
 
-def _inside(
+def inside_margin(
     surface: Surface, region: np.ndarray, patches: Sequence[Patch], margin: float
 ) -> np.ndarray:
     """Indices of the region's points that are not in the margin along its border."""
@@ -144,6 +144,24 @@ def _inside(
             own = patch.label == OWN
             inside[patch.index[own]] = patch.border.distance(patch.uv[own]) >= margin
     return np.flatnonzero(inside)
+
+
+def covered(
+    points: np.ndarray,
+    normals: np.ndarray,
+    places: np.ndarray,
+    axes: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """Whether (m,) a footprint at places (n, 3), tool z at axes (n, 3), reaches points (m, 3)."""
+    reached = np.zeros(len(points), bool)
+    if len(places) and len(points):
+        pairs = cKDTree(points).sparse_distance_matrix(
+            cKDTree(places), radius, output_type="ndarray"
+        )
+        facing = -np.einsum("pa,pa->p", normals[pairs["i"]], axes[pairs["j"]]) > _FACING
+        reached[pairs["i"][facing]] = True
+    return reached
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import RobotError, unknown_name
-from nrdf.robot.kinematics import Chain
 from nrdf.robot.engine import mujoco
+from nrdf.robot.kinematics import Chain
 from nrdf.robot.spheres import COARSE, FINE, Spheres, cover_box, cover_capsule, cover_cylinder
 
 BUNDLED = Path(__file__).with_name("ur10e.xml")

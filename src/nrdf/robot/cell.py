@@ -9,7 +9,7 @@ import numpy as np
 from nrdf.robot.arm import Arm
 from nrdf.robot.kinematics import Chain, Frames
 from nrdf.robot.solid import Solid
-from nrdf.robot.spheres import COARSE, Spheres
+from nrdf.robot.spheres import Spheres
 from nrdf.robot.tool import Tool
 
 _NEIGHBOURS = 2  # links that far apart along the arm cannot be checked against each other

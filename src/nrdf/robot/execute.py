@@ -150,7 +150,11 @@ def _move(machine: Machine, cell: Cell, action: Action, offset: float) -> tuple[
         if fading:
             offset *= 0.97
         machine.step(
-            plan.joints[i] + offset * plan.along[i], plan.speeds[i], plan.accelerations[i], None, tip
+            plan.joints[i] + offset * plan.along[i],
+            plan.speeds[i],
+            plan.accelerations[i],
+            None,
+            tip,
         )
         tip, axis = machine.tip()
         away = tip - plan.places[i]
@@ -242,9 +246,7 @@ def _gaps(
     return np.interp(np.arange(len(walked)), asked, felt)
 
 
-def _felt(
-    positions: np.ndarray, axes: np.ndarray, found: np.ndarray, radius: float
-) -> np.ndarray:
+def _felt(positions: np.ndarray, axes: np.ndarray, found: np.ndarray, radius: float) -> np.ndarray:
     """Heights (m,) as a soft round pad feels them: over its width along the way, on average."""
     there = found < _LOST_M
     touched = positions + np.where(there, found, 0.0)[:, None] * axes

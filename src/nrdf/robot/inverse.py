@@ -144,6 +144,7 @@ class Library:
 
     joints: np.ndarray
     tree: cKDTree
+    T_flange_tcp: np.ndarray
 
     @staticmethod
     def build(cell: Cell, count: int, rng: np.random.Generator) -> Library:
@@ -159,7 +160,8 @@ class Library:
             good &= centres[:, cell.spheres.links > 0].min(axis=1) > cell.floor_m
             kept.append(part[good])
             keys.append(_key(frames.tcp[good], frames.tool[good, :, 2]))
-        return Library(np.concatenate(kept), cKDTree(np.concatenate(keys)))
+        tree = cKDTree(np.concatenate(keys))
+        return Library(np.concatenate(kept), tree, cell.tool.T_flange_tcp)
 
     def guesses(self, places: np.ndarray, axes: np.ndarray, count: int) -> np.ndarray:
         """First guesses (b, count, n) for targets."""

@@ -119,7 +119,7 @@ def _free(cell: Cell, turn: int, way: np.ndarray) -> Action:
         np.concatenate([part.joints for part in parts]),
         np.concatenate([part.speeds for part in parts]),
         np.concatenate([part.place + i for i, part in enumerate(parts)]),
-        np.zeros(len(way), bool),
+        np.ones(len(way)),
     )
     return Action("free", turn, joined)
 
@@ -139,7 +139,7 @@ def _turned(cell: Cell, before: int, after: int, home: np.ndarray) -> Action:
         seconds = min(apart, 2.0 * np.pi - apart) / TURN_RAD_S
     count = max(int(np.ceil(seconds / STEP_S)), 1)
     still = np.repeat(home[None], count, axis=0)
-    timing = Timed(still, 0.0 * still, np.zeros(count), np.zeros(1, bool))
+    timing = Timed(still, 0.0 * still, np.zeros(count), np.ones(1))
     return Action("turn", after, timing)
 
 

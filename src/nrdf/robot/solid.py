@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import igl
 import numpy as np
@@ -24,6 +25,7 @@ _BAND = 5.0  # cells around the surface where distances are exact
 _COARSE = 4  # nodes apart that the winding number is asked far from the surface
 _MOST_NODES = 6_000_000
 _MOST_POINTS = 30_000
+_SAME_M = 0.02  # between a mesh and the scan of what it is of
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,26 @@ def solid_from_mesh(vertices: np.ndarray, faces: np.ndarray, origin: str = "mesh
     tree = cKDTree(samples)
     value = grid.filled(tree, lambda nodes: winding_numbers(vertices, faces, nodes))
     return grid.solid(value, vertices, faces, samples, origin)
+
+
+def solid_from_file(path: str | Path, points: np.ndarray) -> Solid:
+    """A solid from a mesh file, m, of the object whose points (n, 3) are given.
+
+    Raises DataError for a file that cannot be read, and RobotError for a mesh that is not where
+    the points are.
+    """
+    from nrdf.mesh import load_mesh, outer_skin
+
+    vertices, faces = load_mesh(path)
+    faces, _ = outer_skin(vertices, faces, 2000, np.random.default_rng(0))
+    solid = solid_from_mesh(vertices, faces, f"mesh {Path(path).name}")
+    far = float(np.median(np.abs(solid.distances(points)[0])))
+    if far > _SAME_M:
+        raise RobotError(
+            f"the mesh {path} is {1e3 * far:.0f} mm from the job's points, in the middle: it must "
+            "be in metres, in the job's frame"
+        )
+    return solid
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,18 @@ _FINE = 4  # places between two waypoints at which limits are looked at
 @dataclass(frozen=True)
 class Timed:
     """joints (t, n), rad, and their speeds (t, n) at each step of the simulation; place (t,): which
-    waypoint the arm is at, a number between 0 and the last; slowed (m,): whether the joints' speed
-    limits keep the arm from its feed around each waypoint."""
+    waypoint the arm is at, a number between 0 and the last; pace (m,): the share of its feed that
+    the joints' speed limits leave around each waypoint."""
 
     joints: np.ndarray
     speeds: np.ndarray
     place: np.ndarray
-    slowed: np.ndarray
+    pace: np.ndarray
+
+    @property
+    def slowed(self) -> np.ndarray:
+        """Whether (m,) the feed cannot be kept."""
+        return self.pace < 1.0
 
 
 def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 1.0) -> Timed:
@@ -40,13 +45,11 @@ def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 
     count = len(joints)
     if count == 1 or np.abs(np.diff(joints, axis=0)).max() < 1e-9:
         still = np.repeat(joints[:1], 2, axis=0)
-        return Timed(still, 0.0 * still, np.array([0.0, count - 1.0]), np.zeros(count, bool))
+        return Timed(still, 0.0 * still, np.array([0.0, count - 1.0]), np.ones(count))
     limits = share * chain.speeds
     needed = (np.abs(np.diff(joints, axis=0)) / limits).max(axis=1)
-    slow = needed > np.maximum(seconds, 1e-9)
-    slowed = np.zeros(count, bool)
-    slowed[:-1] |= slow
-    slowed[1:] |= slow
+    kept = np.minimum(seconds / np.maximum(needed, 1e-9), 1.0)
+    paced = np.minimum(np.append(kept, 1.0), np.append(1.0, kept))
     nominal = np.maximum(np.maximum(seconds, needed), 1e-4)
     knots = np.concatenate([[0.0], np.cumsum(nominal)])
     curve = PchipInterpolator(knots, joints, axis=0)
@@ -66,7 +69,7 @@ def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 
         joints=curve(at),
         speeds=curve(at, 1) * rate[:, None],
         place=np.interp(at, knots, np.arange(count)),
-        slowed=slowed,
+        pace=paced,
     )
 
 
