@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from nrdf.robot.solid import Solid
 from nrdf.robot.spheres import Spheres
 from nrdf.robot.tool import Tool
 
+COLUMN_M = 0.09
+"""Radius of the column that a raised base stands on."""
 _NEIGHBOURS = 2  # links that far apart along the arm cannot be checked against each other
 _ALWAYS = 0.3  # share of random places in which two links must touch to be taken for neighbours
 
@@ -92,12 +94,13 @@ class Cell:
     @staticmethod
     def build(arm: Arm, tool: Tool, solid: Solid, placement: Placement, up: np.ndarray) -> Cell:
         size, flange = arm.chain.size, arm.chain.T_last_tool
-        few = arm.few_spheres + tool.spheres(size, flange, 4.0)
+        column = _column(-placement.base_m[2])
+        few = arm.few_spheres + column + tool.spheres(size, flange, 4.0)
         return Cell(
             arm=arm,
             tool=tool,
             chain=arm.chain.with_tool(tool.T_flange_tcp),
-            spheres=arm.spheres + tool.spheres(size, flange),
+            spheres=arm.spheres + column + tool.spheres(size, flange),
             few=few,
             solid=solid,
             poses=placement.T_base_object(solid, up),
@@ -108,9 +111,7 @@ class Cell:
 
     def placed(self, placement: Placement, up: np.ndarray) -> Cell:
         """The same arm, tool and object at another place."""
-        poses = placement.T_base_object(self.solid, up)
-        floor = -placement.base_m[2]
-        return replace(self, poses=poses, floor_m=floor, turns_rad=placement.turns_rad)
+        return Cell.build(self.arm, self.tool, self.solid, placement, up)
 
     def to_base(
         self, turn: np.ndarray, points: np.ndarray, vectors: np.ndarray
@@ -162,6 +163,15 @@ class Clearance:
     point: np.ndarray
     slope: np.ndarray
     floor: np.ndarray
+
+
+def _column(floor: float) -> Spheres:
+    """The column that a raised base stands on, from the floor up."""
+    if floor > -COLUMN_M:
+        return Spheres.none()
+    start, end = np.array([0.0, 0.0, floor]), np.array([0.0, 0.0, -0.5 * COLUMN_M])
+    centres, radius = cover_capsule(start, end, COLUMN_M)
+    return Spheres(centres, np.full(len(centres), radius), np.zeros(len(centres), int))
 
 
 def _pairs(chain: Chain, spheres: Spheres) -> np.ndarray:

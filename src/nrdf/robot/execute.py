@@ -26,7 +26,7 @@ SETTLED_SHARE, SETTLES_S = 0.1, 1.5
 """The tool waits at a line's beginning until the force is that close, for at most that long."""
 _RESPONSE_S = 0.035  # of the force controller
 _FASTEST_M_S = 0.05  # of its correction
-_FARTHEST_M = 0.02
+_FARTHEST_M = 0.012
 _DAMPING_S = 0.004  # of the pad, as a share of its stiffness
 _FRICTION = 0.2
 _ASKED_M, _ASKED_RAD = 0.003, np.radians(4.0)  # between places where the surface is looked for
@@ -144,11 +144,9 @@ def _move(machine: Machine, cell: Cell, action: Action, offset: float) -> tuple[
     count = len(plan.joints)
     waits = round(action.dwell_s / STEP_S)
     record = _Record(machine, count + waits)
-    fading = action.kind in ("free", "turn")
     tip, axis = machine.tip()
     for i in [*range(count), *([count - 1] * waits)]:
-        if fading:
-            offset *= 0.97
+        offset *= 0.97
         machine.step(
             plan.joints[i] + offset * plan.along[i],
             plan.speeds[i],

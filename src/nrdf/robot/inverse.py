@@ -135,7 +135,7 @@ def wishes(cell: Cell, frames: Frames, joints: np.ndarray, near: Clearance) -> n
     middle, half = 0.5 * (chain.lower + chain.upper), 0.5 * (chain.upper - chain.lower)
     share = (joints - middle) / half
     wish -= 0.3 * np.sign(share) * np.maximum(np.abs(share) - _LIMIT_SHARE, 0.0)
-    return np.clip(wish, -0.06, 0.06)
+    return np.clip(wish, -0.02, 0.02)
 
 
 @dataclass(frozen=True)

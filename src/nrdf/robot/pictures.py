@@ -37,14 +37,23 @@ def draw(
     except Exception as error:  # whatever OpenGL raises
         return f"no pictures: this machine has no OpenGL that MuJoCo can draw with ({error})"
     with studio:
-        first = max(simulated.paths, key=lambda driven: driven.outcome.reached)
-        _save(folder / STILL, studio.image(first, _busiest(first.logs), -1, *_SIZE))
+        first = max(
+            simulated.paths, key=lambda driven: driven.path.tool_radius_m * _longest(driven)
+        )
+        _save(
+            folder / STILL,
+            studio.image(first, item := _busiest(first.logs), len(item.joints) // 2, *_SIZE),
+        )
         if film:
             _film(folder / FILM, studio, simulated, progress)
     with _Studio(simulated, "coverage") as studio:
         images = [studio.object_image(angle, 720, 640) for angle in (-0.6, 2.4)]
         _save(folder / COVERAGE, np.concatenate(images, axis=1))
     return None
+
+
+def _longest(driven: DrivenPath) -> int:
+    return max((len(log.joints) for log in driven.logs if log.action.kind == "process"), default=0)
 
 
 def _busiest(logs: Sequence[Log]) -> Log:
@@ -115,9 +124,9 @@ class _Studio:
         self._place(drawn, item.joints[at], pose)
         renderer = self._renderer(driven, width, height)
         camera = mujoco.MjvCamera()
-        middle = 0.55 * (pose[:3, :3] @ self._middle() + pose[:3, 3])
+        middle = 0.6 * (pose[:3, :3] @ self._middle() + pose[:3, 3])
         camera.lookat[:] = middle + [0.0, 0.0, 0.1]
-        camera.distance, camera.azimuth, camera.elevation = 2.6, 125.0, -18.0
+        camera.distance, camera.azimuth, camera.elevation = 2.3, 118.0, -16.0
         renderer.update_scene(drawn.data, camera)
         _add_lines(renderer.scene, driven, pose)
         return np.asarray(renderer.render())
@@ -136,7 +145,7 @@ class _Studio:
         camera.azimuth = np.degrees(angle)
         option = mujoco.MjvOption()
         option.geomgroup[:] = 0
-        option.geomgroup[5] = 1
+        option.geomgroup[2] = 1
         renderer.update_scene(drawn.data, camera, option)
         return np.asarray(renderer.render())
 
@@ -198,7 +207,7 @@ def _build(
         mesh.uservert, mesh.userface = vertices.ravel().tolist(), faces.ravel().tolist()
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=[*colour, 1.0], group=5,
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=[*colour, 1.0], group=2,
             contype=0, conaffinity=0,
         )  # fmt: skip
     model = spec.compile()

@@ -65,7 +65,7 @@ def _add_motors(spec: Any, cell: Cell) -> None:
     mujoco.mj_fullM(model, data, mass)
     for name in cell.arm.joint_names:
         address = model.jnt_dofadr[model.joint(name).id]
-        inertia = max(float(mass[address, address]), 0.1)
+        inertia = max(float(mass[address, address]), 0.4)
         stiff = STIFFNESS_1_S**2 * inertia
         motor = spec.add_actuator(name=f"nrdf_{name}", target=name)
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
@@ -128,7 +128,9 @@ class Machine:
         data.ctrl[self._motor] = joints + self._lead * speeds
         self._wanted[self._speed] = accelerations
         mujoco.mj_mulM(self.model, data, self._torque, self._wanted)
-        data.qfrc_applied[:] = self._torque
+        self._wanted[self._speed] = speeds
+        # The joints' own friction is known, and fed forward as well.
+        data.qfrc_applied[:] = self._torque + self.model.dof_damping.ravel() * self._wanted
         applied = data.xfrc_applied[self._tool]
         if push is None:
             applied[:] = 0.0
