@@ -9,7 +9,7 @@ import numpy as np
 from nrdf.robot.arm import Arm
 from nrdf.robot.kinematics import Chain, Frames
 from nrdf.robot.solid import Solid
-from nrdf.robot.spheres import Spheres
+from nrdf.robot.spheres import Spheres, cover_capsule
 from nrdf.robot.tool import Tool
 
 COLUMN_M = 0.09

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from nrdf.robot.cell import Cell
 from nrdf.robot.follow import Stroke
-from nrdf.robot.inverse import Library
+from nrdf.robot.inverse import Library, solve
 from nrdf.robot.lines import Line
 from nrdf.robot.timing import FREE_SHARE, STEP_S, Timed, timed
 from nrdf.robot.transit import Ways
@@ -19,6 +19,7 @@ FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
 TURN_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
+_FINE_M, _FINE_RAD = 0.004, np.radians(3.0)  # between places on a line
 _HOME_CLEARANCE_M = 0.05
 _MOST_HOMES = 400
 
@@ -151,10 +152,18 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
         ("departure", [stroke.joints[-1], *stroke.lead_out], line.lead_out_feed_m_s),
     )
     for kind, joints, feed in parts:
-        way = np.array(joints)
+        way, number = np.array(joints), np.arange(float(len(joints)))
+        if kind == "process":
+            way, number = _fine(cell, line, stroke)
         tips = cell.chain.frames(way).tcp
         seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
         timing = timed(cell.chain, way, seconds)
+        nearest = np.searchsorted(np.rint(number), np.arange(len(joints)))
+        timing = replace(
+            timing,
+            place=np.interp(timing.place, np.arange(len(way)), number),
+            pace=np.minimum.reduceat(timing.pace, nearest),
+        )
         works = kind == "process"
         made.append(
             Action(
@@ -168,3 +177,33 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
             )
         )
     return made
+
+
+def _fine(cell: Cell, line: Line, stroke: Stroke) -> tuple[np.ndarray, np.ndarray]:
+    """A stroke's joints (k, n) with places in between that are on the line too, and the waypoint
+    that each is at, a number between 0 and the last.
+
+    Between waypoints, joints that move evenly would take the tool off the straight line.
+    """
+    part = slice(stroke.first, stroke.last + 1)
+    positions, axes = line.positions[part], line.axes[part]
+    if len(positions) == 1:
+        return stroke.joints, np.zeros(1)
+    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(axes, axis=0), axis=1)
+    counts = np.ceil(np.maximum(moved / _FINE_M, turned / _FINE_RAD)).astype(int).clip(1, 50)
+    steps = [k + np.arange(count) / count for k, count in enumerate(counts)]
+    number = np.append(np.concatenate(steps), len(positions) - 1.0)
+
+    def between(values: np.ndarray) -> np.ndarray:
+        known = np.arange(len(values))
+        return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
+
+    along = between(axes)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    turn = np.full(len(number), stroke.turn)
+    at, along = cell.to_base(turn, between(positions), along)
+    guess = between(stroke.joints)
+    joints, good = solve(cell.chain, guess, at, along, 8)
+    joints[~good] = guess[~good]
+    return joints, number
