@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("mujoco", reason="pip install 'nrdf[robot]'")
 
 from nrdf.errors import ProcessError, RobotError
+from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.robot.arm import BUNDLED, load_arm
 from nrdf.robot.cell import Cell, Placement
 from nrdf.robot.inverse import Library, errors, solve
@@ -17,7 +18,6 @@ from nrdf.robot.solid import solid_from_points
 from nrdf.robot.spheres import cover_box, cover_capsule, cover_cylinder
 from nrdf.robot.timing import STEP_S, timed
 from nrdf.robot.tool import tool_of
-from nrdf.process.toolpath import Segment, ToolPath
 
 PLACE = Placement((0.8, 0.0, 0.4), np.pi, 0.4, (0.0,))
 
@@ -151,7 +151,7 @@ def test_the_force_sensor_feels_the_push_and_not_the_weight(cell):
 
 
 def test_a_missing_robot_file():
-    with pytest.raises(RobotError, match="no robot file nowhere.urdf; give a URDF or MJCF file"):
+    with pytest.raises(RobotError, match=r"no robot file nowhere\.urdf; give a URDF or MJCF file"):
         load_arm("nowhere.urdf")
 
 
@@ -263,7 +263,7 @@ def test_a_robot_that_reaches_nothing(job, arm):
 
     place = Placement((4.0, 0.0, 0.3), np.pi, 0.0, (0.0,))
     with pytest.raises(
-        RobotError, match="reaches none of the job's waypoints from its base at 4.00"
+        RobotError, match=r"reaches none of the job's waypoints from its base at 4\.00"
     ):
         simulate(read_work(job), arm, placement=place)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nrdf.commands.console import (
     command_line,
     console,
+    errors,
     progress_bar,
     provenance,
     show,
@@ -33,8 +34,9 @@ def demo(
 
     The paper's demonstration (Fig. 6): five regions are taught on one chair, each with a strategy
     of its own; they are found on three others, where tool paths are planned, measured and written
-    for a robot. The chairs are members of the parametric family that no training set holds, so the
-    true regions are known exactly; the table shows found against true.
+    for a robot, and the first chair's are driven on an arm in simulation. The chairs are members
+    of the parametric family that no training set holds, so the true regions are known exactly; the
+    table shows found against true.
 
     Example: nrdf demo --out demo --overwrite
 
@@ -49,8 +51,15 @@ def demo(
 
     with output_folder(out, overwrite) as folder:
         results = _run(folder, model, device)
+        simulated = _simulate(folder)
     _show(results)
     first = f"{out}/{TARGETS[0]}"
+    if simulated is not None:
+        from nrdf.commands.simulate import show_simulation
+
+        console.print(f"\n{TARGETS[0]} on the bundled arm, in simulation:")
+        show_simulation(simulated)
+        console.print(f"{first}/simulation/report.html shows it, with a film")
     console.print(
         f"\npicture and report in {out}; for each chair a job: {first}/report.html shows it.\n"
         f"Next, for instance, change {out}/chair.yaml, then\n"
@@ -120,6 +129,28 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     draw_regions(panels, folder / "picture.png")
     write_report(folder, {**origin, "unit": "m", "found": [vars(row) for row in results]})
     return results
+
+
+def _simulate(folder: Path) -> dict[str, Any] | None:
+    """The first chair's job on the bundled arm; None where MuJoCo is not installed."""
+    from importlib.util import find_spec
+
+    from nrdf.bundled import TARGETS
+
+    if find_spec("mujoco") is None:
+        errors.print("no arm: pip install 'nrdf[robot]' for the simulation", style="yellow")
+        return None
+    from nrdf.robot.arm import load_arm
+    from nrdf.robot.result import write_simulation
+    from nrdf.robot.simulate import read_work, simulate
+
+    job = folder / TARGETS[0]
+    with errors.status("the arm") as status:
+        done = simulate(read_work(job), load_arm(), progress=status.update)
+    (job / "simulation").mkdir()
+    origin = {"command": command_line(), "versions": versions()}
+    with progress_bar("pictures") as progress:
+        return write_simulation(job / "simulation", done, TARGETS[0], origin, progress=progress)
 
 
 def _write_lesson(folder: Path) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,8 +29,9 @@ class Arm:
 
     spec: the MuJoCo specification, without tool. joint_names: of the chain, base first. body:
     name of the body that the tool is mounted on; T_body_flange: (4, 4), of the tool frame in it.
-    spheres: around the arm's own shapes; few_spheres: the same with fewer, larger ones. checked: what was found on loading, in words; warnings:
-    what a person should know before trusting results.
+    spheres: around the arm's own shapes; few_spheres: the same with fewer, larger ones. checked:
+    what was found on loading, in words; warnings: what a person should know before trusting
+    results.
     """
 
     name: str
@@ -138,7 +140,7 @@ def _read(file: Path) -> tuple[Any, list[str]]:
 
 
 def _mesh_file(folder: Path, meshdir: str, name: str) -> Path | None:
-    """Where a mesh is: URDF files name them from a package's folder, which may be anywhere above."""
+    """Where a mesh is: URDF names them from a package's folder, which may be anywhere above."""
     tail = Path(name.split("://", 1)[-1])
     if tail.suffix.lower() not in (".stl", ".obj", ".msh"):
         return None
@@ -279,7 +281,7 @@ def _chain(
     frames = [np.eye(4)]
     for joint in chosen:
         frames.append(_pose(data.xmat[model.jnt_bodyid[joint]], data.xanchor[joint]))
-    origins = [np.linalg.inv(a) @ b for a, b in zip(frames[:-1], frames[1:], strict=True)]
+    origins = [np.linalg.inv(a) @ b for a, b in itertools.pairwise(frames)]
     tool = data.site(frame) if is_site else data.body(frame)
     place = tool.xpos
     limited = model.jnt_limited[chosen].astype(bool)

@@ -45,7 +45,7 @@ def find_collisions(
 
 
 def clearances(cell: Cell, joints: np.ndarray, turn: int) -> dict[str, np.ndarray]:
-    """Distances (t,), m, of joints (t, n) from the object, the floor, and of the arm from itself."""
+    """Distances (t,), m, of joints (t, n) from the object, the floor, and the arm itself."""
     parts: dict[str, list[np.ndarray]] = {"object": [], "floor": [], "itself": []}
     for start in range(0, len(joints), _BATCH):
         frames = cell.chain.frames(joints[start : start + _BATCH])

@@ -21,7 +21,7 @@ NOTES = (
     "object is not modelled, nor are the cables of the tool.",
     "The tool is a round, soft pad on a bent neck; its spin about its axis is free. The pad may "
     "touch whatever is beside the surface; everything behind it must touch nothing.",
-    f"Contact: the pad gives {1e3 * PAD_GIVES_M:.0f} mm at the commanded force, and is pushed along "
+    f"Contact: the pad gives {1e3 * PAD_GIVES_M:.0f} mm at the commanded force, pushed along "
     "the tool's axis from where the scan's smooth surface is. The arm, its motors and its force "
     "sensor are MuJoCo's.",
     "Force is counted while the tool moves along its lines; before each line it waits until the "

@@ -110,7 +110,7 @@ def places(
 
 @dataclass
 class _Tracks:
-    """Followed lines: joints (t, length, n), good (t, length); line (t,), turn (t,), length (t,)."""
+    """Followed lines: joints (t, length, n), good (t, length); line (t,), turn (t,)."""
 
     line: np.ndarray
     turn: np.ndarray

@@ -92,7 +92,7 @@ def solve(
     axes: np.ndarray,
     rounds: int = 30,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (b, n) that bring the tool to targets, from a first guess, and whether (b,) they do."""
+    """Joints (b, n) that bring the tool to targets, from first guesses, and whether they do (b,)."""
     joints = joints.copy()
     good = np.zeros(len(joints), bool)
     moving = np.arange(len(joints))
@@ -140,7 +140,7 @@ def wishes(cell: Cell, frames: Frames, joints: np.ndarray, near: Clearance) -> n
 
 @dataclass(frozen=True)
 class Library:
-    """Configurations of an arm with a tool, by where they bring it: first guesses for any target."""
+    """Configurations of an arm with a tool, by where they bring it, to begin a search from."""
 
     joints: np.ndarray
     tree: cKDTree

@@ -188,10 +188,7 @@ def _driven(logs: Sequence[Log], height: float) -> tuple[np.ndarray, np.ndarray]
     places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for log in logs:
         asked = log.action.force_n
-        if asked is None:
-            works = log.off_m < _ON_PLAN_M
-        else:
-            works = log.force_n > _PRESSES * asked
+        works = log.off_m < _ON_PLAN_M if asked is None else log.force_n > _PRESSES * asked
         places.append((log.tip + height * log.axis)[works][::3])
         axes.append(log.axis[works][::3])
     return np.concatenate(places), np.concatenate(axes)

@@ -1,4 +1,4 @@
-"""A MuJoCo model of the cell: the arm with its motors, the tool with its force sensor, the floor."""
+"""A MuJoCo model of the cell: the arm with its motors, the tool with its force sensor."""
 
 from __future__ import annotations
 
@@ -122,8 +122,11 @@ class Machine:
         push: np.ndarray | None,
         tip: np.ndarray,
     ) -> None:
-        """One step towards commanded joints (n,), their inertia fed forward; push: (3,) N, what the surface does to the tool at its
-        tip (3,), None where it touches nothing."""
+        """One step towards commanded joints (n,), their inertia fed forward.
+
+        push: (3,) N, what the surface does to the tool at its tip (3,); None where it touches
+        nothing.
+        """
         data = self.data
         data.ctrl[self._motor] = joints + self._lead * speeds
         self._wanted[self._speed] = accelerations

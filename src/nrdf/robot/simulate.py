@@ -1,4 +1,4 @@
-"""A job on an arm, from reach to coverage: everything that `nrdf simulate` does before it writes."""
+"""A job on an arm, from reach to coverage: what `nrdf simulate` does before it writes."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,7 +55,7 @@ def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 
     knots = np.concatenate([[0.0], np.cumsum(nominal)])
     curve = PchipInterpolator(knots, joints, axis=0)
     fine = np.concatenate(
-        [np.linspace(a, b, _FINE, endpoint=False) for a, b in zip(knots, knots[1:], strict=False)]
+        [np.linspace(a, b, _FINE, endpoint=False) for a, b in itertools.pairwise(knots)]
         + [knots[-1:]]
     )
     first, second = curve(fine, 1), curve(fine, 2)
