@@ -37,7 +37,8 @@ def drive(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, 
     reports = {}
     for name in TARGETS:
         work = read_work(folder / name)
-        done = simulate(work, load_arm(), progress=lambda what, n=name: progress(f"{n}: {what}"))
+        progress(name)
+        done = simulate(work, load_arm())
         reports[name] = report_of(done)
     return reports
 

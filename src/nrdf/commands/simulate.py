@@ -65,7 +65,7 @@ def simulate(
         for line in arm.checked:
             console.print(line, style="dim")
         given, count = _placement(base, stand, turns)
-        solid = None if mesh is None else solid_from_file(mesh, work.cloud.points)
+        solid = None if mesh is None else solid_from_file(mesh, work.points)
         with errors.status("simulation") as status:
             shift = tuple(x / 1e3 for x in shift_mm)
             done = run(work, arm, solid, given, count, shift, seed, status.update)

@@ -330,7 +330,7 @@ def _spheres(
     used = np.flatnonzero(collides if collides.any() else np.ones(model.ngeom, bool))
     made = Spheres.none()
     for geom in used:
-        centres, radius = _cover(model, geom, step)
+        centres, radius = _cover(model, int(geom), step)
         rotation = data.geom_xmat[geom].reshape(3, 3)
         link = owner[model.geom_bodyid[geom]]
         world = centres @ rotation.T + data.geom_xpos[geom]

@@ -292,13 +292,13 @@ def _cover(
                 best[i] = (score, int(t), int(run[0]), int(run[-1]))
         if not best:
             return strokes
-        for i, stroke in _with_leads(cell, lines, tracks, best).items():
-            _, t, first, last = best[i]
+        for number, stroke in _with_leads(cell, lines, tracks, best).items():
+            _, t, first, last = best[number]
             if stroke is None:
                 blocked[t] = True
             else:
                 strokes.append(stroke)
-                covered[i][first : last + 1] = True
+                covered[number][first : last + 1] = True
 
 
 def _with_leads(

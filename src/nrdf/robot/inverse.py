@@ -92,7 +92,7 @@ def solve(
     axes: np.ndarray,
     rounds: int = 30,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (b, n) that bring the tool to targets, from first guesses, and whether they do (b,)."""
+    """Joints (b, n) that bring the tool to targets, from first guesses; whether (b,) they do."""
     joints = joints.copy()
     good = np.zeros(len(joints), bool)
     moving = np.arange(len(joints))

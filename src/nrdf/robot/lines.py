@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,10 +80,9 @@ def _lead(
 ) -> np.ndarray:
     """Places of a free move that ends on the surface at `end`, evenly, without the end itself."""
     if segment is None:
-        corners: Sequence[np.ndarray] = (end - _SHORT_M * axis, end)
+        way = np.stack([end - _SHORT_M * axis, end])
     else:
-        corners = segment.positions[::-1] if backwards else segment.positions
-    way = np.array(corners, dtype=np.float64)
+        way = segment.positions[::-1] if backwards else segment.positions
     walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     if walked[-1] < 1e-6:
         return np.zeros((0, 3))

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
 from nrdf.errors import ProcessError, RobotError
 from nrdf.process.job_folder import KNOWLEDGE
 from nrdf.process.knowledge import Process
@@ -50,8 +49,14 @@ class Work:
     up: np.ndarray
 
     @property
-    def cloud(self) -> PointCloud:
-        return self.lesson.cloud
+    def points(self) -> np.ndarray:
+        return self.lesson.cloud.points
+
+    @property
+    def normals(self) -> np.ndarray:
+        normals = self.lesson.cloud.normals
+        assert normals is not None  # read_work lets no other pass
+        return normals
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,7 @@ def _direction(up: str | np.ndarray) -> np.ndarray:
 
 def _check_frame(work: Work) -> None:
     """Raise ProcessError where the tool paths are not on the object."""
-    surface = Surface(work.cloud.points, work.cloud.normals)
+    surface = Surface(work.points, work.normals)
     for path, process in zip(work.job.paths, work.processes, strict=True):
         places = [s.positions for s in path.segments if s.kind == "process"]
         if not places:
@@ -146,7 +151,7 @@ def _check_frame(work: Work) -> None:
         far = surface.tree.query(np.concatenate(places))[0] - process.standoff_m
         typical = float(np.median(far))
         if typical > _FARTHEST_M:
-            size = float(np.ptp(work.cloud.points, axis=0).max())
+            size = float(np.ptp(work.points, axis=0).max())
             raise ProcessError(
                 f"the tool path on '{path.region}' is {typical:.3g} m from the object, which "
                 f"measures {size:.3g} m: the two are in different units or frames; both must be in "
@@ -171,10 +176,10 @@ def simulate(
     """
     rng = np.random.default_rng(seed)
     clock = _Clock()
-    surface = Surface(work.cloud.points, work.cloud.normals)
+    surface = Surface(work.points, work.normals)
     progress("shape of the object")
     if solid is None:
-        solid = solid_from_points(work.cloud.points, work.cloud.normals)
+        solid = solid_from_points(work.points, work.normals)
     clock("shape")
     progress("placement")
     every = [(path, lines_of(path)) for path in work.job.paths]

@@ -11,7 +11,8 @@ import numpy as np
 from nrdf.robot.cell import Cell
 from nrdf.robot.inverse import LEAST_CLEARANCE_M
 
-_STEP_RAD = 0.06
+_STEP_RAD, _FINER = 0.08, 8
+_NEAR_M = 0.06
 _CLEAR_M = 0.75 * LEAST_CLEARANCE_M  # the ends of strokes may be as near as they are
 _TRIED_EDGES = 12
 _EXTENSION_RAD = 0.5
@@ -49,20 +50,25 @@ class Ways:
     def _free_steps(self, one: np.ndarray, other: np.ndarray) -> float:
         """The share of a straight move that hits nothing, from its beginning."""
         count = max(int(np.ceil(np.abs(other - one).max() / _STEP_RAD)), 1)
-        way = one + np.linspace(0.0, 1.0, count + 1)[1:, None] * (other - one)
-        # A coarse look first: most blocked ways are blocked over long stretches.
-        for part in (slice(3, None, 8), slice(None)):
-            joints = way[part]
-            if not len(joints):
-                continue
-            frames = self.cell.chain.frames(joints)
-            good = self.cell.clearance(frames, np.full(len(joints), self.turn)).least > _CLEAR_M
-            if good.all() and part == slice(None):
-                good &= self.cell.own_clearance(frames) > _CLEAR_M
-            if not good.all():
-                first = int(np.argmin(good)) * (8 if part.step == 8 else 1)
-                return max(first - (5 if part.step == 8 else 0), 0) / count
+        share = np.linspace(0.0, 1.0, count + 1)
+        clear = self._clearance(one + share[:, None] * (other - one))
+        blocked = clear[1:] <= _CLEAR_M
+        if blocked.any():
+            return float(share[int(np.argmax(blocked))]) * 0.7
+        # Where something is nearer than the arm moves in a step, looks in between as well.
+        near = np.minimum(clear[:-1], clear[1:]) < _NEAR_M
+        between = share[:-1][near, None] + np.arange(1, _FINER) / _FINER / count
+        fine = between.ravel()
+        if len(fine):
+            blocked = self._clearance(one + fine[:, None] * (other - one)) <= _CLEAR_M
+            if blocked.any():
+                return max(float(fine[int(np.argmax(blocked))]) - 1.0 / count, 0.0)
         return 1.0
+
+    def _clearance(self, joints: np.ndarray) -> np.ndarray:
+        frames = self.cell.chain.frames(joints)
+        least = self.cell.clearance(frames, np.full(len(joints), self.turn)).least
+        return np.minimum(least, self.cell.own_clearance(frames))
 
     def _explore(self, joints: np.ndarray) -> int | None:
         """Join joints (n,) to the tree by a random tree that grows from there."""
