@@ -293,9 +293,9 @@ def _cover(
         if not best:
             return strokes
         for number, stroke in _with_leads(cell, lines, tracks, best).items():
-            _, t, first, last = best[number]
+            _, row, first, last = best[number]
             if stroke is None:
-                blocked[t] = True
+                blocked[row] = True
             else:
                 strokes.append(stroke)
                 covered[number][first : last + 1] = True
