@@ -125,7 +125,7 @@ class _Studio:
         renderer = self._renderer(driven, width, height)
         camera = mujoco.MjvCamera()
         middle = 0.6 * (pose[:3, :3] @ self._middle() + pose[:3, 3])
-        camera.lookat[:] = [*middle, 0.0, 0.0, 0.1]
+        camera.lookat[:] = middle + np.array([0.0, 0.0, 0.1])
         camera.distance, camera.azimuth, camera.elevation = 2.3, 118.0, -16.0
         renderer.update_scene(drawn.data, camera)
         _add_lines(renderer.scene, driven, pose)
