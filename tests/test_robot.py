@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-pytest.importorskip("mujoco", reason="pip install 'nrdf[robot]'")
+# Not by importing it: nrdf must be first, to choose what MuJoCo draws with.
+if find_spec("mujoco") is None:
+    pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
 from nrdf.errors import ProcessError, RobotError
 from nrdf.process.toolpath import Segment, ToolPath
