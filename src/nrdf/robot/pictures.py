@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 FILM, STILL, COVERAGE = "film.webp", "picture.png", "coverage.png"
 _SIZE, _FILM_SIZE = (1080, 810), (520, 400)
-_FRAMES, _FRAME_MS = 140, 90
+_FRAMES, _FRAME_MS = 90, 120
 _PLAIN, _DONE, _MISSED = (0.80, 0.81, 0.83), (0.10, 0.62, 0.35), (0.84, 0.25, 0.15)
 
 
@@ -128,6 +128,9 @@ class _Studio:
         camera.lookat[:] = middle + np.array([0.0, 0.0, 0.1])
         camera.distance, camera.azimuth, camera.elevation = 2.3, 118.0, -16.0
         renderer.update_scene(drawn.data, camera)
+        # Shadows cost half of the time, and a small picture does well without.
+        shadows = width > _FILM_SIZE[0]
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         _add_lines(renderer.scene, driven, pose)
         return np.asarray(renderer.render())
 
