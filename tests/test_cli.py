@@ -203,7 +203,7 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(retrieve, tmp_path, monkeypatch
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_real_ctrl_c_ends_with_130_and_leaves_nothing(untrained, tmp_path):
-    command = [sys.executable, "-m", "nrdf.cli", "demo", "--model", str(untrained)]
+    command = [sys.executable, "-m", "nrdf.cli", "demo", "--no-arm", "--model", str(untrained)]
     process = subprocess.Popen(
         [*command, "--out", str(tmp_path / "demo")],
         stderr=subprocess.PIPE,
@@ -233,7 +233,7 @@ def test_unexpected_errors_keep_their_traceback(retrieve, tmp_path, monkeypatch)
 def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path, monkeypatch):
     monkeypatch.setattr("nrdf.bundled.TARGETS", ("rocker",))
     out = tmp_path / "demo"
-    assert cli.run(["demo", "--model", str(untrained), "--out", str(out)]) == 0
+    assert cli.run(["demo", "--no-arm", "--model", str(untrained), "--out", str(out)]) == 0
     report = json.loads((out / "report.json").read_text())
     assert {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()} == set(report["files"])
     rows = report["found"]

@@ -41,6 +41,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.scan import scan
     from nrdf.commands.shapes import boxes, correspond, prepare, synth
     from nrdf.commands.show import demo
+    from nrdf.commands.simulate import simulate
     from nrdf.commands.studio import studio
     from nrdf.commands.train import train
     from nrdf.commands.transfer import transfer
@@ -51,6 +52,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "knowledge": knowledge,
         "transfer": transfer,
         "export": export,
+        "simulate": simulate,
         "demo": demo,
         "studio": studio,
         "info": info,

@@ -41,6 +41,10 @@ class ProcessError(NrdfError):
     """Process knowledge, a tool path or a job that cannot be used."""
 
 
+class RobotError(NrdfError):
+    """A robot that cannot be loaded, or that cannot do a job."""
+
+
 class OutputError(NrdfError):
     """An output folder that is not empty, or that cannot be written."""
 

@@ -185,9 +185,10 @@ def bench(
     device: str = "cpu",
     repeats: int = 7,
     steps: int = 3,
+    robot: Path | None = None,
     out: Path | None = None,
 ) -> None:
-    """Measure speed and memory of retrieval, transfer and training.
+    """Measure speed and memory of retrieval, transfer and training; or a demonstration on an arm.
 
     8 regions on a target of 8192 points without normals, the reference embedded before; transfer
     with the chairs' model. Every other measurement runs in a process of its own.
@@ -199,11 +200,19 @@ def bench(
         device: cpu, cuda, cuda:N or auto.
         repeats: Warm retrievals, of which the median is taken.
         steps: Training steps a stage, of which the median is taken; 0 leaves training out.
+        robot: Folder of `nrdf demo`, whose chairs are driven on the bundled arm, instead of all the
+            rest: reach, accuracy, collisions, force, coverage, speed.
         out: JSON file to write.
     """
     from nrdf.benchmark.latency import measure, to_json
     from nrdf.benchmark.transfer_speed import measure_transfer
     from nrdf.output import write_json
+
+    if robot is not None:
+        from nrdf.commands.bench_robot import bench_robot
+
+        bench_robot(robot, out)
+        return
 
     with errors.status("measuring") as status:
         retrieval, training, failures = measure(preset, device, repeats, steps, status.update)

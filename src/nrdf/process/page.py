@@ -16,7 +16,7 @@ from nrdf.ply import write_atomically
 from nrdf.process.report import FIGURES, figures
 from nrdf.units import in_words
 
-_STYLE = """
+STYLE = """
 :root { --ink: #1f2328; --soft: #656d76; --line: #d8dee4; --bad: #b42318; --good: #1a7f37; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: var(--ink);
@@ -76,7 +76,7 @@ def write_page(
     text = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{_STYLE}</style></head>\n<body>"
+        f"<title>{title}</title><style>{STYLE}</style></head>\n<body>"
         + "\n".join(parts)
         + "</body></html>\n"
     )
@@ -113,15 +113,15 @@ def _notes(report: Mapping[str, Any]) -> str:
     limits = report["limits"]
     parts = []
     if limits["not_met"]:
-        parts.append(_note("bad", "Limits not met", limits["not_met"]))
+        parts.append(note("bad", "Limits not met", limits["not_met"]))
     elif limits["set"]:
         parts.append('<div class="note good">Every limit that was set is met.</div>')
     if report["warnings"]:
-        parts.append(_note("", "Look at", report["warnings"]))
+        parts.append(note("", "Look at", report["warnings"]))
     return "".join(parts)
 
 
-def _note(kind: str, title: str, lines: Sequence[str]) -> str:
+def note(kind: str, title: str, lines: Sequence[str]) -> str:
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
     return f'<div class="note {kind}"><b>{title}</b><ul>{items}</ul></div>'
 

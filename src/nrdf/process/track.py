@@ -67,6 +67,24 @@ class Track:
         return np.bincount(point[new], minlength=len(points))
 
 
+def covered(
+    points: np.ndarray,
+    normals: np.ndarray,
+    places: np.ndarray,
+    axes: np.ndarray,
+    radius: float,
+) -> np.ndarray:
+    """Whether (m,) a footprint at places (n, 3), tool z at axes (n, 3), reaches points (m, 3)."""
+    reached = np.zeros(len(points), bool)
+    if len(places) and len(points):
+        pairs = cKDTree(points).sparse_distance_matrix(
+            cKDTree(places), radius, output_type="ndarray"
+        )
+        facing = -np.einsum("pa,pa->p", normals[pairs["i"]], axes[pairs["j"]]) > _FACING
+        reached[pairs["i"][facing]] = True
+    return reached
+
+
 def track_of(lines: Sequence[Line], radius_m: float, stepover_m: float) -> Track:
     """The way of an upright tool of that radius along lines."""
     contacts, tools = [line.contacts for line in lines], [-line.normals for line in lines]

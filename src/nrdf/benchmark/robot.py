@@ -1,0 +1,80 @@
+"""The demonstration on the bundled arm, against the figures that it must reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.bundled import TARGETS
+from nrdf.errors import DataError
+from nrdf.robot.arm import load_arm
+from nrdf.robot.figures import report_of
+from nrdf.robot.simulate import read_work, simulate
+
+
+@dataclass(frozen=True)
+class Figure:
+    """name, the bar in words, a value for each chair, and whether each meets the bar."""
+
+    name: str
+    bar: str
+    values: tuple[float, ...]
+    met: tuple[bool, ...]
+
+
+def drive(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, Any]]:
+    """The report of each of the demonstration's chairs.
+
+    Raises DataError where `folder` is not what `nrdf demo` wrote.
+    """
+    missing = [name for name in TARGETS if not (folder / name).is_dir()]
+    if missing:
+        raise DataError(f"{folder} has no {', '.join(missing)}: nrdf demo --out {folder} first")
+    reports = {}
+    for name in TARGETS:
+        work = read_work(folder / name)
+        progress(name)
+        done = simulate(work, load_arm())
+        reports[name] = report_of(done)
+    return reports
+
+
+def figures(reports: dict[str, dict[str, Any]]) -> list[Figure]:
+    """What the demonstration must reach, chair by chair."""
+
+    def figure(
+        name: str, bar: str, value: Callable[[dict[str, Any]], float], most: float
+    ) -> Figure:
+        values = tuple(value(report) for report in reports.values())
+        # A bar below 0 is the negative of a least value.
+        good = tuple(v <= most if most >= 0.0 else v >= -most for v in values)
+        return Figure(name, bar, values, good)
+
+    def worst(report: dict[str, Any], key: str) -> float:
+        return max(path[key] for path in report["paths"])
+
+    def lost(report: dict[str, Any]) -> float:
+        parts = [path["coverage"] for path in report["paths"]]
+        return max(100.0 * (part["planned"] - part["achieved"]) for part in parts)
+
+    return [
+        figure("waypoints reached, %", "at least 95",
+               lambda r: 100.0 * r["total"]["reached_share"], -95.0),
+        figure("position error, mm", "at most 0.1",
+               lambda r: 1e3 * worst(r, "position_error_m"), 0.1),
+        figure("axis error, °", "at most 0.1",
+               lambda r: float(np.degrees(worst(r, "axis_error_rad"))), 0.1),
+        figure("kinematics, ms a waypoint", "at most 5",
+               lambda r: r["speed"]["ik_ms_per_waypoint"], 5.0),
+        figure("moves with a collision, all reported", "0",
+               lambda r: float(r["total"]["collisions"]), 0.0),
+        figure("contact within ±20 % of the force, %", "at least 95",
+               lambda r: 100.0 * (r["total"]["force_within"] or 0.0), -95.0),
+        figure("coverage lost, worst region, %", "at most 3", lost, 3.0),
+        figure("times faster than real time", "at least 10",
+               lambda r: r["speed"]["times_real_time"], -10.0),
+    ]  # fmt: skip

@@ -1,0 +1,125 @@
+"""`nrdf simulate`: a job on an arm, before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from tyro.conf import Positional
+
+from nrdf.commands.console import command_line, console, errors, progress_bar, show, table, versions
+
+
+def simulate(
+    job: Positional[Path],
+    out: Path,
+    robot: Path | None = None,
+    tool_frame: str | None = None,
+    base: tuple[str, ...] = ("auto",),
+    stand: float = 0.0,
+    turns: int | None = None,
+    mesh: Path | None = None,
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "y",
+    shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    pictures: bool = True,
+    seed: int = 0,
+    overwrite: bool = False,
+) -> None:
+    """Drive a job on a robot arm in simulation.
+
+    Reach, collisions, contact force and the coverage really achieved, on the bundled six-axis arm
+    (a UR10e's kinematics) or any URDF or MJCF of six or seven axes. The object stands on a
+    turntable before the arm. Writes joint trajectories (CSV, ROS 2 bag, URScript), report.json,
+    report.html, pictures and a film.
+
+    Example: nrdf simulate job/ --out sim/
+
+    Args:
+        job: Folder that `nrdf transfer` wrote.
+        out: Folder to write; made if missing.
+        robot: URDF or MJCF file; the bundled arm unless given.
+        tool_frame: Body or site of the robot that the tool is mounted on.
+        base: Place of the arm's base, m: x y z from the floor under the middle of the object, x the
+            object's own x, z up; or auto, to search for the one that reaches most.
+        stand: Height of the object above the floor, m, where the base is given.
+        turns: Turns of the turntable to choose from (12); 1 for an object that stays as it is, as
+            it does unless given where the base is given.
+        mesh: Mesh of the object in metres, in the job's frame, for collisions; the scan unless
+            given.
+        up: Direction in the job's frame that points up.
+        shift_mm: Put the object off its place by x y z, in its own frame, to try the force control.
+        pictures: Draw pictures and a film.
+        seed: Of the random searches.
+        overwrite: Replace an earlier result in the output folder.
+    """
+    from nrdf.output import output_folder
+    from nrdf.robot.arm import load_arm
+    from nrdf.robot.result import write_simulation
+    from nrdf.robot.simulate import read_work
+    from nrdf.robot.simulate import simulate as run
+    from nrdf.robot.solid import solid_from_file
+
+    with output_folder(out, overwrite) as folder:
+        work = read_work(job, up)
+        arm = load_arm(robot, tool_frame)
+        for line in arm.checked:
+            console.print(line, style="dim")
+        given, count = _placement(base, stand, turns)
+        solid = None if mesh is None else solid_from_file(mesh, work.points)
+        with errors.status("simulation") as status:
+            shift = tuple(x / 1e3 for x in shift_mm)
+            done = run(work, arm, solid, given, count, shift, seed, status.update)
+        origin = {"command": command_line(), "job": str(job), "versions": versions()}
+        with progress_bar("pictures") as progress:
+            report = write_simulation(
+                folder, done, job.resolve().name, origin, pictures, pictures, progress
+            )
+    show_simulation(report)
+    console.print(f"all in {out}; {out}/report.html shows it")
+
+
+def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[Any, int]:
+    """The placement that is given, None for a search, and the number of turns."""
+    import numpy as np
+
+    from nrdf.errors import RobotError
+    from nrdf.robot.cell import Placement
+
+    if turns is not None and turns < 1:
+        raise RobotError(f"--turns is {turns}; give 1 or more")
+    if base == ("auto",):
+        return None, turns or 12
+    try:
+        x, y, z = (float(value) for value in base)
+    except ValueError:
+        raise RobotError(
+            f"--base is '{' '.join(base)}'; give auto, or three numbers: x y z in metres"
+        ) from None
+    count = turns or 1
+    angles = tuple((2.0 * np.pi * np.arange(count) / count).tolist())
+    # The base's x looks at the object.
+    return Placement((x, y, z), float(np.arctan2(-y, -x)), stand, angles), count
+
+
+def show_simulation(report: dict[str, Any]) -> None:
+    """A table of a simulation's tool paths, what to look at, and the whole."""
+    from nrdf.robot.figures import COLUMNS, figures
+
+    shown = table("", "region", "process", *COLUMNS, texts=2)
+    for path in report["paths"]:
+        shown.add_row(path["region"], path["process"], *figures(path))
+    show(shown)
+    for warning in report["warnings"]:
+        errors.print(warning, style="yellow")
+    total, speed, place = report["total"], report["speed"], report["placement"]
+    within = total["force_within"]
+    force = "" if within is None else f", force within ±20 % for {within:.1%} of the contact"
+    minutes, seconds = divmod(round(total["time_s"]), 60)
+    console.print(
+        f"{total['reached_share']:.1%} of {total['waypoints']} waypoints reached, "
+        f"{total['collisions']} moves with a collision{force}; {minutes} min {seconds} s\n"
+        f"base at {' '.join(f'{x:.2f}' for x in place['base_m'])} m, object "
+        f"{place['stand_m']:.2f} m above the floor, {len(place['turns_used_rad'])} turns; "
+        f"{speed['ik_ms_per_waypoint']:.1f} ms a waypoint, simulation "
+        f"{speed['times_real_time']:.0f} times faster than real time"
+    )

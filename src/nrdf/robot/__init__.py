@@ -1,0 +1,1 @@
+"""An arm that executes a job in simulation: reach, collisions, contact force, coverage."""

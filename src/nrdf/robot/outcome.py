@@ -1,0 +1,193 @@
+"""What came of a tool path: waypoints reached, force, coverage, time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from nrdf.process.knowledge import Process
+from nrdf.process.lesson import Lesson
+from nrdf.process.patch import inside_margin, patches_of
+from nrdf.process.surface import Surface
+from nrdf.process.toolpath import ToolPath
+from nrdf.process.track import covered as reached_by
+from nrdf.robot.cell import Cell
+from nrdf.robot.execute import Log
+from nrdf.robot.follow import Why
+from nrdf.robot.lines import Line
+from nrdf.robot.program import PathProgram
+from nrdf.robot.timing import STEP_S
+
+Verdict = Literal["reached", "limit", "singular", "collision", "too fast"]
+VERDICTS: tuple[Verdict, ...] = ("reached", "limit", "singular", "collision", "too fast")
+FORCE_BAND = 0.2
+TOO_SLOW = 0.5
+"""Share of its feed below which the joints' speed limits make a waypoint too fast for the arm."""
+_PRESSES = 0.3  # of the commanded force, from which on the surface counts as worked
+_ON_PLAN_M = 0.003
+_FINE_M = 0.005
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Figures of one tool path.
+
+    verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
+    reached waypoints, of the planned joints. coverage_*: share of the region's points inside its
+    margin. worked: (k,) of those points; region_points: their indices on the target. force_*: while
+    the tool moves along its lines; None where nothing is pressed. off_plan_99_m: of the tool from
+    its line, the way along the axis left out.
+    """
+
+    verdicts: tuple[np.ndarray, ...]
+    reached: int
+    waypoints: int
+    pieces: int
+    position_error_m: float
+    axis_error_rad: float
+    coverage_planned: float
+    coverage_achieved: float
+    region_points: np.ndarray
+    worked: np.ndarray
+    planned: np.ndarray
+    force_asked_n: float | None
+    force_mean_n: float | None
+    force_spread_n: float | None
+    force_within: float | None
+    contact_s: float
+    settling_s: float
+    off_plan_99_m: float
+    slow_share: float
+    seconds: dict[str, float]
+
+    @property
+    def cycle_time_s(self) -> float:
+        return sum(self.seconds.values())
+
+    def count(self, verdict: Verdict) -> int:
+        return int(sum((line == verdict).sum() for line in self.verdicts))
+
+
+def outcome(
+    lesson: Lesson,
+    surface: Surface,
+    path: ToolPath,
+    process: Process,
+    cell: Cell,
+    lines: Sequence[Line],
+    program: PathProgram,
+    covered: Sequence[np.ndarray],
+    why: Sequence[Why],
+    logs: Sequence[Log],
+) -> Outcome:
+    """Figures of a tool path that was driven."""
+    verdicts = _verdicts(lines, program, covered, why)
+    away, angle = _errors(cell, lines, program)
+    region = lesson.regions[path.region]
+    inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
+    points, normals = surface.points[inside], surface.normals[inside]
+    height = process.standoff_m
+    plan_places, plan_axes = _planned(lines, height)
+    planned = reached_by(points, normals, plan_places, plan_axes, path.tool_radius_m)
+    work = [log for log in logs if log.action.kind == "process"]
+    places, axes = _driven(work, height)
+    worked = reached_by(points, normals, places, axes, path.tool_radius_m)
+    pressing = [log for log in work if log.action.force_n is not None]
+    asked = pressing[0].action.force_n if pressing else None
+    force = np.concatenate([log.force_n[log.working] for log in pressing] or [np.zeros(0)])
+    within = np.abs(force - (asked or 0.0)) <= FORCE_BAND * (asked or 0.0)
+    off = np.concatenate([log.off_m for log in work] or [np.zeros(1)])
+    slowed = [log.action.timed.slowed for log in work] or [np.zeros(1, bool)]
+    seconds: dict[str, float] = {}
+    for log in logs:
+        kind = log.action.kind
+        seconds[kind] = seconds.get(kind, 0.0) + len(log.joints) * STEP_S
+    moved = sum(int(log.working.sum()) for log in pressing) * STEP_S
+    return Outcome(
+        verdicts=verdicts,
+        reached=int(sum((line == "reached").sum() for line in verdicts)),
+        waypoints=sum(len(line.positions) for line in lines),
+        pieces=len(program.strokes),
+        position_error_m=away,
+        axis_error_rad=angle,
+        coverage_planned=float(planned.mean()) if len(planned) else 0.0,
+        coverage_achieved=float(worked.mean()) if len(worked) else 0.0,
+        region_points=inside,
+        worked=worked,
+        planned=planned,
+        force_asked_n=asked,
+        force_mean_n=float(force.mean()) if len(force) else None,
+        force_spread_n=float(force.std()) if len(force) else None,
+        force_within=float(within.mean()) if len(force) else None,
+        contact_s=moved,
+        settling_s=sum(len(log.joints) for log in pressing) * STEP_S - moved,
+        off_plan_99_m=float(np.quantile(off, 0.99)),
+        slow_share=float(np.concatenate(slowed).mean()),
+        seconds=seconds,
+    )
+
+
+def _verdicts(
+    lines: Sequence[Line],
+    program: PathProgram,
+    covered: Sequence[np.ndarray],
+    why: Sequence[Why],
+) -> tuple[np.ndarray, ...]:
+    made = []
+    for done, told in zip(covered, why, strict=True):
+        verdict = np.full(len(done), "reached", dtype="<U9")
+        verdict[~done & told.regular] = "collision"  # on the ways to and from it
+        verdict[~done & ~told.regular] = "singular"
+        verdict[~done & ~told.clear] = "collision"
+        verdict[~done & ~told.arrives] = "limit"
+        made.append(verdict)
+    for stroke in program.stranded:
+        made[stroke.line][stroke.first : stroke.last + 1] = "collision"
+    for action in program.actions:
+        if action.kind == "process":
+            part = made[action.line][action.first : action.first + len(action.timed.slowed)]
+            part[action.timed.pace < TOO_SLOW] = "too fast"
+    return tuple(made)
+
+
+def _errors(cell: Cell, lines: Sequence[Line], program: PathProgram) -> tuple[float, float]:
+    """The worst distance and angle between planned joints and their waypoints."""
+    from nrdf.robot.inverse import errors
+
+    away, angle = 0.0, 0.0
+    for stroke in program.strokes:
+        part = slice(stroke.first, stroke.last + 1)
+        line = lines[stroke.line]
+        turn = np.full(len(stroke.joints), stroke.turn)
+        at, along = cell.to_base(turn, line.positions[part], line.axes[part])
+        far, turned = errors(cell.chain.frames(stroke.joints), at, along)
+        away, angle = max(away, float(far.max())), max(angle, float(turned.max()))
+    return away, angle
+
+
+def _planned(lines: Sequence[Line], height: float) -> tuple[np.ndarray, np.ndarray]:
+    """The tool's places and axes along all lines as planned, finely."""
+    places, axes = [], []
+    for line in lines:
+        steps = np.linalg.norm(np.diff(line.positions, axis=0), axis=1)
+        way = np.concatenate([[0.0], np.cumsum(steps)])
+        at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / _FINE_M)), 1) + 1)
+        place = np.stack([np.interp(at, way, line.positions[:, k]) for k in range(3)], axis=1)
+        axis = np.stack([np.interp(at, way, line.axes[:, k]) for k in range(3)], axis=1)
+        places.append(place + height * axis)
+        axes.append(axis)
+    return np.concatenate(places), np.concatenate(axes)
+
+
+def _driven(logs: Sequence[Log], height: float) -> tuple[np.ndarray, np.ndarray]:
+    """The tool's places and axes where it really worked."""
+    places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for log in logs:
+        asked = log.action.force_n
+        works = log.off_m < _ON_PLAN_M if asked is None else log.force_n > _PRESSES * asked
+        places.append((log.tip + height * log.axis)[works][::3])
+        axes.append(log.axis[works][::3])
+    return np.concatenate(places), np.concatenate(axes)

@@ -1,0 +1,209 @@
+"""What the arm does from beginning to end: strokes, and the free moves and turns between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from nrdf.robot.cell import Cell
+from nrdf.robot.follow import Stroke
+from nrdf.robot.inverse import Library, solve
+from nrdf.robot.lines import Line
+from nrdf.robot.timing import FREE_SHARE, STEP_S, Timed, timed
+from nrdf.robot.transit import Ways
+
+FREE_M_S = 1.5
+"""How fast the tool may be in free moves."""
+TURN_RAD_S = np.radians(45.0)
+"""How fast the turntable turns."""
+_FINE_M, _FINE_RAD = 0.004, np.radians(3.0)  # between places on a line
+_HOME_CLEARANCE_M = 0.05
+_MOST_HOMES = 400
+
+Kind = Literal["free", "approach", "process", "departure", "turn"]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One stretch of what the arm does.
+
+    turn: which of the object's turns. timed: joints at each step, the arm at rest at both ends.
+    line, first: of a stroke, which line of its path and the waypoint it begins at; -1 elsewhere.
+    """
+
+    kind: Kind
+    turn: int
+    timed: Timed
+    line: int = -1
+    first: int = 0
+    force_n: float | None = None
+    dwell_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PathProgram:
+    """The actions of one tool path; strokes: those driven; stranded: those that no free way leads
+    to."""
+
+    actions: tuple[Action, ...]
+    strokes: tuple[Stroke, ...]
+    stranded: tuple[Stroke, ...]
+
+
+def find_home(cell: Cell, library: Library) -> np.ndarray:
+    """Joints (n,) at which the object may turn: far from it at every turn, and near the middle."""
+    chosen = library.joints[:_MOST_HOMES]
+    least = np.full(len(chosen), np.inf)
+    frames = cell.chain.frames(chosen)
+    for turn in range(len(cell.poses)):
+        found = cell.clearance(frames, np.full(len(chosen), turn)).least
+        least = np.minimum(least, found)
+    stretch = np.abs(chosen).max(axis=1)
+    worth = np.minimum(least, 0.15) - 0.02 * stretch
+    worth[least < _HOME_CLEARANCE_M] = least[least < _HOME_CLEARANCE_M] - 1.0
+    return np.asarray(chosen[int(worth.argmax())])
+
+
+def program(
+    cell: Cell,
+    lines: Sequence[Line],
+    strokes: Sequence[Stroke],
+    home: np.ndarray,
+    rng: np.random.Generator,
+    progress: Callable[[], None] = lambda: None,
+) -> PathProgram:
+    """Drive strokes from home and back to it: turn by turn, and each time the nearest one next."""
+    actions: list[Action] = []
+    driven, stranded = [], []
+    ways: dict[int, Ways] = {}
+    turn = -1
+    node, at = 0, home
+    waiting = list(strokes)
+    while waiting:
+        progress()
+        same = [s for s in waiting if s.turn == waiting[0].turn]
+        stroke = min(same, key=lambda s: float(np.abs(s.whole()[0] - at).max()))
+        waiting = [s for s in waiting if s is not stroke]
+        net = ways.setdefault(stroke.turn, Ways(cell, stroke.turn, home, rng))
+        whole = stroke.whole()
+        start = net.join(whole[0])
+        stop = None if start is None else net.join(whole[-1])
+        if start is None or stop is None:
+            stranded.append(stroke)
+            continue
+        if stroke.turn != turn:
+            if turn >= 0 and node:
+                actions.append(_free(cell, turn, ways[turn].way(node, 0)))
+            actions.append(_turned(cell, turn, stroke.turn, home))
+            turn, node = stroke.turn, 0
+        actions.append(_free(cell, turn, net.way(node, start)))
+        actions += _stroke(cell, lines[stroke.line], stroke)
+        driven.append(stroke)
+        node, at = stop, whole[-1]
+    if node:
+        actions.append(_free(cell, turn, ways[turn].way(node, 0)))
+    return PathProgram(tuple(actions), tuple(driven), tuple(stranded))
+
+
+def _free(cell: Cell, turn: int, way: np.ndarray) -> Action:
+    """A free move through corners, at each of which the arm stops."""
+    parts = [
+        timed(cell.chain, np.stack([a, b]), np.array([far / FREE_M_S]), FREE_SHARE)
+        for a, b, far in zip(way[:-1], way[1:], _lengths(cell, way), strict=True)
+    ]
+    if not parts:
+        parts = [timed(cell.chain, way[:1], np.zeros(0))]
+    joined = Timed(
+        np.concatenate([part.joints for part in parts]),
+        np.concatenate([part.speeds for part in parts]),
+        np.concatenate([part.place + i for i, part in enumerate(parts)]),
+        np.ones(len(way)),
+    )
+    return Action("free", turn, joined)
+
+
+def _lengths(cell: Cell, way: np.ndarray) -> np.ndarray:
+    """About how far (k - 1,), m, the tool goes between corners (k, n)."""
+    fine = way[:-1, None] + np.linspace(0.0, 1.0, 6)[:, None] * np.diff(way, axis=0)[:, None]
+    tips = cell.chain.frames(fine.reshape(-1, way.shape[1])).tcp.reshape(len(way) - 1, 6, 3)
+    return np.asarray(np.linalg.norm(np.diff(tips, axis=1), axis=2).sum(axis=1))
+
+
+def _turned(cell: Cell, before: int, after: int, home: np.ndarray) -> Action:
+    """The object turns while the arm waits at home; no time for the first turn, set up by hand."""
+    seconds = 0.0
+    if before >= 0:
+        apart = abs(cell.turns_rad[after] - cell.turns_rad[before]) % (2.0 * np.pi)
+        seconds = min(apart, 2.0 * np.pi - apart) / TURN_RAD_S
+    count = max(int(np.ceil(seconds / STEP_S)), 1)
+    still = np.repeat(home[None], count, axis=0)
+    timing = Timed(still, 0.0 * still, np.zeros(count), np.ones(1))
+    return Action("turn", after, timing)
+
+
+def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
+    made: list[Action] = []
+    parts = (
+        ("approach", [*stroke.lead_in, stroke.joints[0]], line.lead_in_feed_m_s),
+        ("process", [*stroke.joints], line.feed_m_s),
+        ("departure", [stroke.joints[-1], *stroke.lead_out], line.lead_out_feed_m_s),
+    )
+    for kind, joints, feed in parts:
+        way, number = np.array(joints), np.arange(float(len(joints)))
+        if kind == "process":
+            way, number = _fine(cell, line, stroke)
+        tips = cell.chain.frames(way).tcp
+        seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
+        timing = timed(cell.chain, way, seconds)
+        nearest = np.searchsorted(np.rint(number), np.arange(len(joints)))
+        timing = replace(
+            timing,
+            place=np.interp(timing.place, np.arange(len(way)), number),
+            pace=np.minimum.reduceat(timing.pace, nearest),
+        )
+        works = kind == "process"
+        made.append(
+            Action(
+                kind,  # type: ignore[arg-type]
+                stroke.turn,
+                timing,
+                line=stroke.line,
+                first=stroke.first,
+                force_n=line.force_n if works else None,
+                dwell_s=line.dwell_s if works else 0.0,
+            )
+        )
+    return made
+
+
+def _fine(cell: Cell, line: Line, stroke: Stroke) -> tuple[np.ndarray, np.ndarray]:
+    """A stroke's joints (k, n) with places in between that are on the line too, and the waypoint
+    that each is at, a number between 0 and the last.
+
+    Between waypoints, joints that move evenly would take the tool off the straight line.
+    """
+    part = slice(stroke.first, stroke.last + 1)
+    positions, axes = line.positions[part], line.axes[part]
+    if len(positions) == 1:
+        return stroke.joints, np.zeros(1)
+    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    turned = np.linalg.norm(np.diff(axes, axis=0), axis=1)
+    counts = np.ceil(np.maximum(moved / _FINE_M, turned / _FINE_RAD)).astype(int).clip(1, 50)
+    steps = [k + np.arange(count) / count for k, count in enumerate(counts)]
+    number = np.append(np.concatenate(steps), len(positions) - 1.0)
+
+    def between(values: np.ndarray) -> np.ndarray:
+        known = np.arange(len(values))
+        return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
+
+    along = between(axes)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    turn = np.full(len(number), stroke.turn)
+    at, along = cell.to_base(turn, between(positions), along)
+    guess = between(stroke.joints)
+    joints, good = solve(cell.chain, guess, at, along, 8)
+    joints[~good] = guess[~good]
+    return joints, number

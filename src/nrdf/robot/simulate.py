@@ -1,0 +1,242 @@
+"""A job on an arm, from reach to coverage: what `nrdf simulate` does before it writes."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from nrdf.errors import ProcessError, RobotError
+from nrdf.process.job_folder import KNOWLEDGE
+from nrdf.process.knowledge import Process
+from nrdf.process.lesson import Lesson, read_lesson
+from nrdf.process.surface import Surface
+from nrdf.process.toolpath import Job, ToolPath, read_job
+from nrdf.robot.arm import Arm
+from nrdf.robot.cell import Cell, Placement
+from nrdf.robot.collision import Collision, find_collisions
+from nrdf.robot.execute import Log, execute
+from nrdf.robot.follow import Stroke, follow
+from nrdf.robot.inverse import Library
+from nrdf.robot.lines import Line, lines_of
+from nrdf.robot.outcome import Outcome, outcome
+from nrdf.robot.placement import find_placement
+from nrdf.robot.program import PathProgram, find_home, program
+from nrdf.robot.solid import Solid, solid_from_points
+from nrdf.robot.tool import tool_of
+
+log = logging.getLogger(__name__)
+
+LIBRARY_SIZE = 40_000
+_FARTHEST_M = 0.05  # that a waypoint may be from the object, beyond the process's stand-off
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job with the object that it is for.
+
+    lesson: the job's own knowledge: the target in metres with its regions. processes: of each of
+    the job's paths. up: (3,) unit, in the target's frame.
+    """
+
+    job: Job
+    lesson: Lesson
+    processes: tuple[Process, ...]
+    up: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        return self.lesson.cloud.points
+
+    @property
+    def normals(self) -> np.ndarray:
+        normals = self.lesson.cloud.normals
+        assert normals is not None  # read_work lets no other pass
+        return normals
+
+
+@dataclass(frozen=True)
+class DrivenPath:
+    """One tool path on the arm."""
+
+    path: ToolPath
+    process: Process
+    cell: Cell
+    lines: tuple[Line, ...]
+    strokes: tuple[Stroke, ...]
+    program: PathProgram
+    logs: tuple[Log, ...]
+    collisions: tuple[Collision, ...]
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A job, driven. seconds: of processor time by phase; shift_m: of the object off its place."""
+
+    work: Work
+    arm: Arm
+    solid: Solid
+    placement: Placement
+    reachable: float
+    paths: tuple[DrivenPath, ...]
+    shift_m: np.ndarray
+    seconds: dict[str, float]
+
+
+def read_work(folder: str | Path, up: str | np.ndarray = "y") -> Work:
+    """A job's folder, as `nrdf transfer` writes it.
+
+    Raises ProcessError where it is no such folder, or where its tool paths and its object do not
+    fit each other: another frame or unit.
+    """
+    folder = Path(folder)
+    job = read_job(folder)
+    if not folder.is_dir():
+        folder = folder.parent
+    if not (folder / KNOWLEDGE).is_file():
+        raise ProcessError(
+            f"{folder} has no {KNOWLEDGE}, which says what the tool paths are on; give the whole "
+            "folder that `nrdf transfer` wrote"
+        )
+    lesson = read_lesson(folder / KNOWLEDGE)
+    if not job.paths:
+        raise ProcessError("the job has no tool paths: no region was found or planned")
+    frame = lesson.cloud.frame or "target"
+    if job.frame != frame:
+        raise ProcessError(
+            f"the job's tool paths are in the frame '{job.frame}', its object in '{frame}'; "
+            "transfer it again, so that both are in one"
+        )
+    if lesson.cloud.normals is None:
+        raise ProcessError(f"the job's {lesson.knowledge.reference.cloud} has no normals")
+    processes = tuple(_process(lesson, path) for path in job.paths)
+    work = Work(job, lesson, processes, _direction(up))
+    _check_frame(work)
+    return work
+
+
+def _process(lesson: Lesson, path: ToolPath) -> Process:
+    for region in lesson.knowledge.regions:
+        for process in region.processes:
+            if region.name == path.region and process.label == path.process:
+                return process
+    raise ProcessError(
+        f"the job's tool path '{path.process}' on '{path.region}' is not in its {KNOWLEDGE}; "
+        "transfer it again"
+    )
+
+
+def _direction(up: str | np.ndarray) -> np.ndarray:
+    if isinstance(up, str):
+        sign = -1.0 if up.startswith("-") else 1.0
+        name = up.removeprefix("-")
+        if name not in ("x", "y", "z"):
+            raise ProcessError(f"up is '{up}'; give x, y, z, -x, -y or -z")
+        return sign * np.eye(3)["xyz".index(name)]
+    return np.asarray(up, float) / np.linalg.norm(up)
+
+
+def _check_frame(work: Work) -> None:
+    """Raise ProcessError where the tool paths are not on the object."""
+    surface = Surface(work.points, work.normals)
+    for path, process in zip(work.job.paths, work.processes, strict=True):
+        places = [s.positions for s in path.segments if s.kind == "process"]
+        if not places:
+            raise ProcessError(f"the tool path on '{path.region}' has no process segment")
+        far = surface.tree.query(np.concatenate(places))[0] - process.standoff_m
+        typical = float(np.median(far))
+        if typical > _FARTHEST_M:
+            size = float(np.ptp(work.points, axis=0).max())
+            raise ProcessError(
+                f"the tool path on '{path.region}' is {typical:.3g} m from the object, which "
+                f"measures {size:.3g} m: the two are in different units or frames; both must be in "
+                "metres, in the target's frame"
+            )
+
+
+def simulate(
+    work: Work,
+    arm: Arm,
+    solid: Solid | None = None,
+    placement: Placement | None = None,
+    turns: int = 12,
+    shift_m: Sequence[float] = (0.0, 0.0, 0.0),
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda what: None,
+) -> Simulated:
+    """Drive a job on an arm, in simulation.
+
+    solid: the object's shape, from its points unless given; placement: searched for unless given,
+    with the object at any of `turns` turns. Raises RobotError where nothing can be reached.
+    """
+    rng = np.random.default_rng(seed)
+    clock = _Clock()
+    surface = Surface(work.points, work.normals)
+    progress("shape of the object")
+    if solid is None:
+        solid = solid_from_points(work.points, work.normals)
+    clock("shape")
+    progress("placement")
+    every = [(path, lines_of(path)) for path in work.job.paths]
+    placement, reachable = find_placement(arm, every, solid, work.up, placement, turns, rng)
+    if reachable == 0.0:
+        raise RobotError(
+            f"the arm '{arm.name}' reaches none of the job's waypoints from its base at "
+            f"{' '.join(f'{x:.2f}' for x in placement.base_m)} m: place it nearer, let the object "
+            "turn (--turns), or take --base auto"
+        )
+    clock("placement")
+    paths = []
+    home: np.ndarray | None = None
+    library: Library | None = None
+    for path, process in zip(work.job.paths, work.processes, strict=True):
+        where = f"{path.region}, {path.process}"
+        progress(f"{where}: inverse kinematics")
+        cell = Cell.build(arm, tool_of(path), solid, placement, work.up)
+        if library is None or not np.array_equal(library.T_flange_tcp, cell.tool.T_flange_tcp):
+            library = Library.build(cell, LIBRARY_SIZE, rng)
+        lines = lines_of(path)
+        strokes, covered, why = follow(cell, library, lines)
+        clock("inverse kinematics")
+        progress(f"{where}: free moves")
+        home = find_home(cell, library) if home is None else home
+        driven = program(cell, lines, strokes, home, rng)
+        clock("free moves")
+        progress(f"{where}: simulation")
+        logs = execute(cell, driven.actions, surface, np.asarray(shift_m, float))
+        clock("simulation")
+        progress(f"{where}: collisions")
+        collisions = find_collisions(cell, path.region, lines, logs)
+        clock("collisions")
+        result = outcome(
+            work.lesson, surface, path, process, cell, lines, driven, covered, why, logs
+        )
+        clock("figures")
+        paths.append(
+            DrivenPath(
+                path, process, cell, lines, tuple(strokes), driven, tuple(logs),
+                tuple(collisions), result,
+            )
+        )  # fmt: skip
+    if not any(p.outcome.reached for p in paths):
+        raise RobotError(f"the arm '{arm.name}' can drive none of the job's lines")
+    return Simulated(
+        work, arm, solid, placement, reachable, tuple(paths), np.asarray(shift_m, float),
+        clock.seconds,
+    )  # fmt: skip
+
+
+class _Clock:
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.process_time()
+
+    def __call__(self, phase: str) -> None:
+        now = time.process_time()
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._last
+        self._last = now
