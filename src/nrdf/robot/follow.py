@@ -8,7 +8,7 @@ line; where one ends, the tool lifts off and another begins.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,7 @@ _ANCHORS_APART = 60
 _ROUNDS = 7
 _SHORTEST = 3  # waypoints of a piece that is worth a lift, unless nothing longer is found
 _IMPROVEMENTS = 5
+_RETREAT_STEP_M, _RETREAT_STEPS = 0.012, 16
 _LEAST_LEAD = 2  # steps that the tool must be able to leave the surface by
 
 
@@ -347,6 +348,22 @@ def _leads(
                 driven[i].append(values)
         active, before, joints = active[good], joints[good], moved[good]
         step += 1
+
+
+def retreat(cell: Cell, line: Line, stroke: Stroke, start: bool) -> Stroke:
+    """A stroke whose way in (or out) begins (ends) farther from the surface, as far as is clear."""
+    whole = stroke.whole()
+    joints = whole[0] if start else whole[-1]
+    axis = line.axes[stroke.first if start else stroke.last]
+    turn = np.array([stroke.turn])
+    pose = cell.poses[stroke.turn]
+    tip = cell.chain.frames(joints[None]).tcp[0]
+    tip = (tip - pose[:3, 3]) @ pose[:3, :3]
+    way = tip - _RETREAT_STEP_M * np.arange(1, _RETREAT_STEPS + 1)[:, None] * axis
+    driven = _leads(cell, turn, joints[None], [way], axis[None])[0]
+    if start:
+        return replace(stroke, lead_in=np.concatenate([driven[::-1], stroke.lead_in]))
+    return replace(stroke, lead_out=np.concatenate([stroke.lead_out, driven]))
 
 
 def _ordered(strokes: list[Stroke]) -> list[Stroke]:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from nrdf.robot.cell import Cell
-from nrdf.robot.follow import Stroke
+from nrdf.robot.follow import Stroke, retreat
 from nrdf.robot.inverse import Library, solve
 from nrdf.robot.lines import Line
 from nrdf.robot.timing import FREE_SHARE, STEP_S, Timed, timed
@@ -20,6 +20,8 @@ FREE_M_S = 1.5
 TURN_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
 _FINE_M, _FINE_RAD = 0.004, np.radians(3.0)  # between places on a line
+_MOST_WOUND = 3
+_FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
 _MOST_HOMES = 400
 
@@ -72,6 +74,7 @@ def program(
     lines: Sequence[Line],
     strokes: Sequence[Stroke],
     home: np.ndarray,
+    library: Library,
     rng: np.random.Generator,
     progress: Callable[[], None] = lambda: None,
 ) -> PathProgram:
@@ -87,10 +90,11 @@ def program(
         same = [s for s in waiting if s.turn == waiting[0].turn]
         stroke = min(same, key=lambda s: float(np.abs(s.whole()[0] - at).max()))
         waiting = [s for s in waiting if s is not stroke]
-        net = ways.setdefault(stroke.turn, Ways(cell, stroke.turn, home, rng))
+        net = ways.get(stroke.turn)
+        if net is None:
+            net = ways[stroke.turn] = Ways(cell, library, stroke.turn, home, rng)
+        stroke, start, stop = _joined(net, cell, lines[stroke.line], stroke, home)
         whole = stroke.whole()
-        start = net.join(whole[0])
-        stop = None if start is None else net.join(whole[-1])
         if start is None or stop is None:
             stranded.append(stroke)
             continue
@@ -106,6 +110,60 @@ def program(
     if node:
         actions.append(_free(cell, turn, ways[turn].way(node, 0)))
     return PathProgram(tuple(actions), tuple(driven), tuple(stranded))
+
+
+def _joined(
+    net: Ways, cell: Cell, line: Line, stroke: Stroke, home: np.ndarray
+) -> tuple[Stroke, int | None, int | None]:
+    """A stroke, and the nodes of its start and end: with a joint a whole turn away, or farther off
+    the surface, where that helps; None where nothing does."""
+    wound = _wound(cell, stroke, home)
+    for other in wound:
+        start = net.link(other.whole()[0])
+        stop = None if start is None else net.link(other.whole()[-1])
+        if stop is not None:
+            return other, start, stop
+    for other in wound[:_MOST_WOUND]:
+        ends: list[int | None] = []
+        for begins in (True, False):
+            index = 0 if begins else -1
+            node = net.link(other.whole()[index])
+            if node is None:
+                other = retreat(cell, line, other, begins)
+                node = net.link(other.whole()[index])
+            ends.append(net.explore(other.whole()[index]) if node is None else node)
+            if ends[-1] is None:
+                break
+        else:
+            return other, ends[0], ends[1]
+    return stroke, None, None
+
+
+def _wound(cell: Cell, stroke: Stroke, home: np.ndarray) -> list[Stroke]:
+    """The same stroke with none or one of its joints a whole turn away, those near home first.
+
+    An arm's upper arm comes to the same place over its column's front or over its back, of which
+    the one may be blocked all the way.
+    """
+    whole = stroke.whole()
+    low, high = whole.min(axis=0), whole.max(axis=0)
+    found = [(float(np.abs(whole[0] - home).max()), stroke)]
+    for joint in np.flatnonzero(~cell.chain.slides):
+        for turn in (-2.0 * np.pi, 2.0 * np.pi):
+            if low[joint] + turn < cell.chain.lower[joint]:
+                continue
+            if high[joint] + turn > cell.chain.upper[joint]:
+                continue
+            shift = turn * np.eye(cell.chain.size)[joint]
+            other = replace(
+                stroke,
+                joints=stroke.joints + shift,
+                lead_in=stroke.lead_in + shift,
+                lead_out=stroke.lead_out + shift,
+            )
+            # As far off as the joint itself is, not as whichever is farthest.
+            found.append((float(abs(whole[0, joint] + turn - home[joint])), other))
+    return [other for far, other in sorted(found, key=lambda pair: pair[0]) if far < _FARTHEST_RAD]
 
 
 def _free(cell: Cell, turn: int, way: np.ndarray) -> Action:

@@ -205,7 +205,7 @@ def simulate(
         clock("inverse kinematics")
         progress(f"{where}: free moves")
         home = find_home(cell, library) if home is None else home
-        driven = program(cell, lines, strokes, home, rng)
+        driven = program(cell, lines, strokes, home, library, rng)
         clock("free moves")
         progress(f"{where}: simulation")
         logs = execute(cell, driven.actions, surface, np.asarray(shift_m, float))

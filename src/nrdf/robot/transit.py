@@ -1,7 +1,8 @@
 """Free moves between strokes: straight in the joints where nothing is in the way, else around it.
 
-For each turn of the object a tree grows from the home position: every stroke's ends are joined to
-it, by an edge or by a random tree of their own (RRT-connect; Kuffner and LaValle, 2000).
+For each turn of the object a tree grows from the home position. Every stroke's ends are joined to
+it: by an edge, over a configuration of the arm's library that is clear, or by a random tree of
+their own (RRT-connect; Kuffner and LaValle, 2000).
 """
 
 from __future__ import annotations
@@ -9,32 +10,57 @@ from __future__ import annotations
 import numpy as np
 
 from nrdf.robot.cell import Cell
-from nrdf.robot.inverse import LEAST_CLEARANCE_M
+from nrdf.robot.inverse import LEAST_CLEARANCE_M, Library
 
 _STEP_RAD, _FINER = 0.08, 8
 _NEAR_M = 0.06
 _CLEAR_M = 0.75 * LEAST_CLEARANCE_M  # the ends of strokes may be as near as they are
-_TRIED_EDGES = 12
+_TRIED_EDGES, _TRIED_BRIDGES = 8, 25
+_BRIDGES, _WIDE_M = 1500, 0.02  # looked at, and how clear they must be
 _EXTENSION_RAD = 0.5
-_MOST_EXTENSIONS = 250
+_MOST_EXTENSIONS = 80
 _SHORTCUTS = 12
 
 
 class Ways:
     """Free moves at one turn of the object, from and to anywhere."""
 
-    def __init__(self, cell: Cell, turn: int, home: np.ndarray, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        cell: Cell,
+        library: Library,
+        turn: int,
+        home: np.ndarray,
+        rng: np.random.Generator,
+    ) -> None:
         self.cell, self.turn, self.rng = cell, turn, rng
+        some = library.joints[:_BRIDGES]
+        # Whole turns do not matter to where the arm is, but to how far it is from home.
+        near = home + np.mod(some - home + np.pi, 2.0 * np.pi) - np.pi
+        inside = (near > cell.chain.lower) & (near < cell.chain.upper)
+        some = np.where(inside & ~cell.chain.slides, near, some)
+        self._bridges = some[self._clearance(some) > _WIDE_M]
         self.nodes = home[None].copy()
         self.parents = [-1]
 
-    def join(self, joints: np.ndarray) -> int | None:
-        """The number of a node at joints (n,), joined to the tree; None where no way is found."""
-        near = self._nearest(self.nodes, joints, _TRIED_EDGES)
-        for node in near:
+    def link(self, joints: np.ndarray) -> int | None:
+        """The number of a node at joints (n,), joined to the tree by an edge or over a bridge; None
+        where neither is free."""
+        node = self._edge(joints, _TRIED_EDGES)
+        if node is not None:
+            return self._add(joints, node)
+        for bridge in self._bridges[self._nearest_index(self._bridges, joints, _TRIED_BRIDGES)]:
+            if self.free(bridge, joints):
+                node = self._edge(bridge, _TRIED_EDGES)
+                if node is not None:
+                    return self._add(joints, self._add(bridge, node))
+        return None
+
+    def _edge(self, joints: np.ndarray, tries: int) -> int | None:
+        for node in self._nearest_index(self.nodes, joints, tries):
             if self.free(self.nodes[node], joints):
-                return self._add(joints, int(node))
-        return self._explore(joints)
+                return int(node)
+        return None
 
     def way(self, one: int, other: int) -> np.ndarray:
         """Joints (k, n) at the corners of a free move between two nodes, as few as may be."""
@@ -70,8 +96,8 @@ class Ways:
         least = self.cell.clearance(frames, np.full(len(joints), self.turn)).least
         return np.minimum(least, self.cell.own_clearance(frames))
 
-    def _explore(self, joints: np.ndarray) -> int | None:
-        """Join joints (n,) to the tree by a random tree that grows from there."""
+    def explore(self, joints: np.ndarray) -> int | None:
+        """As `link`, by a random tree that grows from there."""
         chain = self.cell.chain
         low, high = np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi)
         nodes, parents = [joints], [-1]
@@ -96,7 +122,7 @@ class Ways:
             reached = nodes[start] + share * (aim - nodes[start])
             nodes.append(reached)
             parents.append(start)
-            for node in self._nearest(self.nodes, reached, 3):
+            for node in self._nearest_index(self.nodes, reached, 3):
                 if self.free(self.nodes[node], reached):
                     return self._graft(nodes, parents, int(node))
         return None
@@ -139,5 +165,5 @@ class Ways:
         return way
 
     @staticmethod
-    def _nearest(nodes: np.ndarray, joints: np.ndarray, count: int) -> np.ndarray:
+    def _nearest_index(nodes: np.ndarray, joints: np.ndarray, count: int) -> np.ndarray:
         return np.argsort(np.abs(nodes - joints).max(axis=1))[:count]
