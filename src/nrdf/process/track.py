@@ -54,12 +54,7 @@ class Track:
         """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
         if not len(points):
             return np.zeros(0, int)
-        pairs = cKDTree(points).sparse_distance_matrix(
-            cKDTree(self.places), radius, output_type="ndarray"
-        )
-        point, place = pairs["i"], pairs["j"]
-        facing = -np.einsum("pa,pa->p", normals[point], self.axes[place]) > _FACING
-        point, place = point[facing], place[facing]
+        point, place = _reached(points, normals, self.places, self.axes, radius)
         order = np.lexsort((place, point))
         point, way = point[order], self.walked[place[order]]
         new = np.ones(len(point), bool)
@@ -77,12 +72,22 @@ def covered(
     """Whether (m,) a footprint at places (n, 3), tool z at axes (n, 3), reaches points (m, 3)."""
     reached = np.zeros(len(points), bool)
     if len(places) and len(points):
-        pairs = cKDTree(points).sparse_distance_matrix(
-            cKDTree(places), radius, output_type="ndarray"
-        )
-        facing = -np.einsum("pa,pa->p", normals[pairs["i"]], axes[pairs["j"]]) > _FACING
-        reached[pairs["i"][facing]] = True
+        reached[_reached(points, normals, places, axes, radius)[0]] = True
     return reached
+
+
+def _reached(
+    points: np.ndarray,
+    normals: np.ndarray,
+    places: np.ndarray,
+    axes: np.ndarray,
+    radius: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (k,), (k,) of a point and a place from which the footprint reaches it."""
+    pairs = cKDTree(points).sparse_distance_matrix(cKDTree(places), radius, output_type="ndarray")
+    point, place = pairs["i"], pairs["j"]
+    facing = -np.einsum("pa,pa->p", normals[point], axes[place]) > _FACING
+    return point[facing], place[facing]
 
 
 def track_of(lines: Sequence[Line], radius_m: float, stepover_m: float) -> Track:
