@@ -16,7 +16,7 @@ from nrdf.ply import write_atomically
 from nrdf.process.report import FIGURES, figures
 from nrdf.units import in_words
 
-STYLE = """
+_STYLE = """
 :root { --ink: #1f2328; --soft: #656d76; --line: #d8dee4; --bad: #b42318; --good: #1a7f37; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: var(--ink);
@@ -72,11 +72,15 @@ def write_page(
         f'<h2>Each of them</h2><div class="paths">{_details(report, close, colours)}</div>',
         _foot(report),
     ]
-    title = escape(f"{report['category']}: {report['title']}")
+    write_html(path, f"{report['category']}: {report['title']}", parts)
+
+
+def write_html(path: Path, title: str, parts: Sequence[str]) -> None:
+    """Write a page in the reports' style; title: plain text, parts: HTML."""
     text = (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{STYLE}</style></head>\n<body>"
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n<body>"
         + "\n".join(parts)
         + "</body></html>\n"
     )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import RobotError, unknown_name
+from nrdf.robot.arm_file import compile_arm, delete_worldly, read_arm_file
 from nrdf.robot.engine import mujoco
 from nrdf.robot.kinematics import Chain
 from nrdf.robot.spheres import COARSE, FINE, Spheres, cover_box, cover_capsule, cover_cylinder
@@ -19,7 +20,6 @@ BUNDLED = Path(__file__).with_name("ur10e.xml")
 _USUAL_SPEED = np.pi  # rad/s (or m/s), where a file gives none
 _SPEEDS = "joint_speed_limits"
 _FRAMES = ("flange", "tool0", "tool_flange", "attachment_site", "ee_link", "link_ee")
-_LARGEST_FILE = 1 << 24
 _SAME = 1e-6  # m, between our forward kinematics and MuJoCo's
 
 
@@ -54,14 +54,14 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
     that do), joints that neither turn nor slide, and any number of axes but six or seven.
     """
     file = BUNDLED if path is None else Path(path)
-    spec, warnings = _read(file)
-    _delete_worldly(spec)
-    model = _compile(spec, file)
+    spec, warnings = read_arm_file(file)
+    delete_worldly(spec)
+    model = compile_arm(spec, file)
     frame, is_site = _tool_frame(model, tool_frame, file)
     chosen = _joints(model, frame, is_site, file)
     names = tuple(model.joint(i).name for i in chosen)
     warnings += _drop_other_joints(spec, model, chosen)
-    model = _compile(spec, file)
+    model = compile_arm(spec, file)
     chosen = [model.joint(name).id for name in names]
     speeds, told = _speed_limits(file, model, names)
     warnings += told
@@ -99,75 +99,6 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
         checked=checked,
         warnings=tuple(warnings),
     )
-
-
-def _read(file: Path) -> tuple[Any, list[str]]:
-    """The file's specification, without meshes that are not there."""
-    if not file.is_file():
-        raise RobotError(f"no robot file {file}; give a URDF or MJCF file, or none for the bundled")
-    if file.stat().st_size > _LARGEST_FILE:
-        raise RobotError(f"{file} is larger than {_LARGEST_FILE >> 20} MiB: no robot description")
-    try:
-        spec = mujoco.MjSpec.from_file(str(file))
-    except Exception as error:  # MuJoCo raises whatever its parsers raise
-        raise RobotError(
-            f"{file} does not load as URDF or MJCF: {_first_line(error)}; a xacro file must be "
-            "turned into URDF first"
-        ) from None
-    spec.compiler.fusestatic = False
-    missing = {}
-    for mesh in list(spec.meshes):
-        name = str(mesh.file)
-        found = _mesh_file(file.parent, spec.meshdir, name)
-        if found is None:
-            missing[mesh.name] = name
-        elif name:
-            mesh.file = str(found)
-    for geom in list(spec.geoms):
-        if geom.meshname in missing:
-            spec.delete(geom)
-    for mesh in list(spec.meshes):
-        if mesh.name in missing:
-            spec.delete(mesh)
-    told = []
-    if missing:
-        names = ", ".join(sorted(missing.values())[:3])
-        told.append(
-            f"{len(missing)} meshes of {file.name} are not there or not STL or OBJ ({names}): "
-            "collisions of these shapes are not seen"
-        )
-    return spec, told
-
-
-def _mesh_file(folder: Path, meshdir: str, name: str) -> Path | None:
-    """Where a mesh is: URDF names them from a package's folder, which may be anywhere above."""
-    tail = Path(name.split("://", 1)[-1])
-    if tail.suffix.lower() not in (".stl", ".obj", ".msh"):
-        return None
-    places = [folder / meshdir / tail, folder / meshdir / tail.name]
-    for above in (folder, *folder.parents[:3]):
-        places += [above / tail, above / Path(*tail.parts[1:])]
-    return next((place.resolve() for place in places if place.is_file()), None)
-
-
-def _delete_worldly(spec: Any) -> None:
-    """Leave out what belongs to a scene rather than to the arm: floors, lights, its own motors."""
-    for geom in list(spec.worldbody.geoms):
-        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
-            spec.delete(geom)
-    for part in (*spec.lights, *spec.cameras, *spec.keys, *spec.actuators, *spec.sensors):
-        spec.delete(part)
-
-
-def _compile(spec: Any, file: Path) -> Any:
-    try:
-        return spec.compile()
-    except Exception as error:
-        raise RobotError(f"{file} does not load: {_first_line(error)}") from None
-
-
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300]
 
 
 def _tool_frame(model: Any, asked: str | None, file: Path) -> tuple[str, bool]:

@@ -12,31 +12,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nrdf.robot.advance import advance, advance_along
 from nrdf.robot.cell import Cell
 from nrdf.robot.inverse import (
-    AXIS_RAD,
     LEAST_CLEARANCE_M,
     LEAST_SINGULAR,
-    POSITION_M,
     Library,
-    errors,
-    improve,
     singular_values,
     solve,
-    wishes,
 )
 from nrdf.robot.lines import Line
 
 GUESSES = 6
-STEP_RAD, STEP_SHARE = 0.25, 2.0
-"""Between neighbouring waypoints joints may move by the first and that many times the angle by
-which the tool's axis turns and, 0.3 m a radian, the place moves; more is a jump to another
-configuration."""
 _KEPT, _KEPT_A_TURN = 6, 2
 _ANCHORS_APART = 60
 _ROUNDS = 7
 _SHORTEST = 3  # waypoints of a piece that is worth a lift, unless nothing longer is found
-_IMPROVEMENTS = 5
 _RETREAT_STEP_M, _RETREAT_STEPS = 0.012, 16
 _LEAST_LEAD = 2  # steps that the tool must be able to leave the surface by
 
@@ -228,47 +219,6 @@ def _track(
         active, at = active[good], at[good]
 
 
-def advance(
-    cell: Cell,
-    turn: np.ndarray,
-    joints: np.ndarray,
-    before: np.ndarray,
-    positions: np.ndarray,
-    axes: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (b, n) at the next targets, from those at the last ones and those before, and whether
-    (b,) the arm gets there without a jump, a collision or a singularity."""
-    chain = cell.chain
-    at, along = cell.to_base(turn, positions, axes)
-    frames = chain.frames(joints)
-    wish = wishes(cell, frames, joints, cell.clearance(frames, turn))
-    moved = np.clip(joints + np.clip(joints - before, -0.1, 0.1), chain.lower, chain.upper)
-    good = np.zeros(len(joints), bool)
-    for k in range(_IMPROVEMENTS):
-        todo = np.flatnonzero(~good)
-        frames = chain.frames(moved[todo])
-        if k:
-            away, angle = errors(frames, at[todo], along[todo])
-            arrived = (away < POSITION_M) & (angle < AXIS_RAD)
-            good[todo[arrived]] = True
-            if k + 1 == _IMPROVEMENTS or arrived.all():
-                break
-            todo, frames = todo[~arrived], chain.frames(moved[todo[~arrived]])
-        hope = wish[todo] if k == 0 else None
-        moved[todo] = improve(chain, frames, moved[todo], at[todo], along[todo], hope)
-    start = chain.frames(joints)
-    far, turned = errors(start, at, along)
-    allowed = STEP_RAD + STEP_SHARE * (turned + far / 0.3)
-    good &= np.abs(moved - joints).max(axis=1) < allowed
-    frames = chain.frames(moved)
-    good &= cell.clearance(frames, turn).least > LEAST_CLEARANCE_M
-    good &= singular_values(frames) > LEAST_SINGULAR
-    if good.any():
-        left = np.flatnonzero(good)
-        good[left] = cell.own_clearance(chain.frames(moved[left])) > LEAST_CLEARANCE_M
-    return moved, good
-
-
 def _cover(
     cell: Cell, lines: Sequence[Line], tracks: _Tracks, covered: list[np.ndarray], least: int
 ) -> list[Stroke]:
@@ -314,7 +264,7 @@ def _with_leads(
         joints += [tracks.joints[t, first], tracks.joints[t, last]]
         ways += [into[::-1], out]
         axes += [lines[i].axes[first], lines[i].axes[last]]
-    driven = _leads(cell, np.array(turns), np.array(joints), ways, np.array(axes))
+    driven = advance_along(cell, np.array(turns), np.array(joints), ways, np.array(axes))
     made: dict[int, Stroke | None] = {}
     for number, (i, (_, t, first, last)) in enumerate(best.items()):
         into, out = driven[2 * number], driven[2 * number + 1]
@@ -328,28 +278,6 @@ def _with_leads(
     return made
 
 
-def _leads(
-    cell: Cell, turn: np.ndarray, joints: np.ndarray, ways: list[np.ndarray], axes: np.ndarray
-) -> list[np.ndarray]:
-    """Joints (k, n) along free moves from the surface, each as far as it is clear."""
-    driven: list[list[np.ndarray]] = [[] for _ in ways]
-    active = np.arange(len(ways))
-    before = joints
-    step = 0
-    while True:
-        more = np.array([len(ways[i]) > step for i in active], bool)
-        active, joints, before = active[more], joints[more], before[more]
-        if not len(active):
-            return [np.array(d).reshape(len(d), cell.chain.size) for d in driven]
-        place = np.array([ways[i][step] for i in active])
-        moved, good = advance(cell, turn[active], joints, before, place, axes[active])
-        for i, values, fine in zip(active, moved, good, strict=True):
-            if fine:
-                driven[i].append(values)
-        active, before, joints = active[good], joints[good], moved[good]
-        step += 1
-
-
 def retreat(cell: Cell, line: Line, stroke: Stroke, start: bool) -> Stroke:
     """A stroke whose way in (or out) begins (ends) farther from the surface, as far as is clear."""
     whole = stroke.whole()
@@ -360,7 +288,7 @@ def retreat(cell: Cell, line: Line, stroke: Stroke, start: bool) -> Stroke:
     tip = cell.chain.frames(joints[None]).tcp[0]
     tip = (tip - pose[:3, 3]) @ pose[:3, :3]
     way = tip - _RETREAT_STEP_M * np.arange(1, _RETREAT_STEPS + 1)[:, None] * axis
-    driven = _leads(cell, turn, joints[None], [way], axis[None])[0]
+    driven = advance_along(cell, turn, joints[None], [way], axis[None])[0]
     if start:
         return replace(stroke, lead_in=np.concatenate([driven[::-1], stroke.lead_in]))
     return replace(stroke, lead_out=np.concatenate([stroke.lead_out, driven]))

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.ply import write_atomically
-from nrdf.process.page import STYLE, note
+from nrdf.process.page import note, write_html
 from nrdf.robot.figures import COLUMNS, figures
 from nrdf.robot.pictures import COVERAGE, FILM, STILL
 
@@ -35,15 +34,8 @@ def write_page(folder: Path, report: Mapping[str, Any]) -> None:
         "<h2>What this is worth</h2>" + "".join(f"<p>{escape(n)}</p>" for n in report["notes"]),
         _robot(report),
     ]
-    title = escape(f"{report['title']} on {report['robot']['name']}")
-    text = (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{STYLE}</style></head>\n<body>"
-        + "\n".join(parts)
-        + "</body></html>\n"
-    )
-    write_atomically(folder / "report.html", [text.encode()])
+    title = f"{report['title']} on {report['robot']['name']}"
+    write_html(folder / "report.html", title, parts)
 
 
 def _head(report: Mapping[str, Any]) -> str:
