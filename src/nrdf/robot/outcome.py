@@ -16,10 +16,10 @@ from nrdf.process.toolpath import ToolPath
 from nrdf.process.track import covered as reached_by
 from nrdf.robot.cell import Cell
 from nrdf.robot.execute import Log
-from nrdf.robot.follow import Why
 from nrdf.robot.lines import Line
 from nrdf.robot.program import PathProgram
 from nrdf.robot.timing import STEP_S
+from nrdf.robot.tracks import Why
 
 Verdict = Literal["reached", "limit", "singular", "collision", "too fast"]
 VERDICTS: tuple[Verdict, ...] = ("reached", "limit", "singular", "collision", "too fast")
@@ -162,7 +162,7 @@ def _errors(cell: Cell, lines: Sequence[Line], program: PathProgram) -> tuple[fl
         part = slice(stroke.first, stroke.last + 1)
         line = lines[stroke.line]
         turn = np.full(len(stroke.joints), stroke.turn)
-        at, along = cell.to_base(turn, line.positions[part], line.axes[part])
+        at, along = cell.to_base(turn, line.positions[part], stroke.axes)
         far, turned = errors(cell.chain.frames(stroke.joints), at, along)
         away, angle = max(away, float(far.max())), max(angle, float(turned.max()))
     return away, angle

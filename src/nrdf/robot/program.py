@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from nrdf.robot.cell import Cell
-from nrdf.robot.follow import Stroke, retreat
-from nrdf.robot.inverse import Library, solve
+from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line
+from nrdf.robot.strokes import Stroke, retreat
 from nrdf.robot.timing import FREE_SHARE, STEP_S, Timed, timed
 from nrdf.robot.transit import Ways
 
@@ -19,7 +19,6 @@ FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
 TURN_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
-_FINE_M, _FINE_RAD = 0.004, np.radians(3.0)  # between places on a line
 _MOST_WOUND = 3
 _FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
@@ -93,7 +92,7 @@ def program(
         net = ways.get(stroke.turn)
         if net is None:
             net = ways[stroke.turn] = Ways(cell, library, stroke.turn, home, rng)
-        stroke, start, stop = _joined(net, cell, lines[stroke.line], stroke, home)
+        stroke, start, stop = _joined(net, cell, stroke, home)
         whole = stroke.whole()
         if start is None or stop is None:
             stranded.append(stroke)
@@ -113,7 +112,7 @@ def program(
 
 
 def _joined(
-    net: Ways, cell: Cell, line: Line, stroke: Stroke, home: np.ndarray
+    net: Ways, cell: Cell, stroke: Stroke, home: np.ndarray
 ) -> tuple[Stroke, int | None, int | None]:
     """A stroke, and the nodes of its start and end: with a joint a whole turn away, or farther off
     the surface, where that helps; None where nothing does."""
@@ -129,7 +128,7 @@ def _joined(
             index = 0 if begins else -1
             node = net.link(other.whole()[index])
             if node is None:
-                other = retreat(cell, line, other, begins)
+                other = retreat(cell, other, begins)
                 node = net.link(other.whole()[index])
             ends.append(net.explore(other.whole()[index]) if node is None else node)
             if ends[-1] is None:
@@ -155,14 +154,9 @@ def _wound(cell: Cell, stroke: Stroke, home: np.ndarray) -> list[Stroke]:
             if high[joint] + turn > cell.chain.upper[joint]:
                 continue
             shift = turn * np.eye(cell.chain.size)[joint]
-            other = replace(
-                stroke,
-                joints=stroke.joints + shift,
-                lead_in=stroke.lead_in + shift,
-                lead_out=stroke.lead_out + shift,
-            )
             # As far off as the joint itself is, not as whichever is farthest.
-            found.append((float(abs(whole[0, joint] + turn - home[joint])), other))
+            far = float(abs(whole[0, joint] + turn - home[joint]))
+            found.append((far, stroke.wound(shift)))
     return [other for far, other in sorted(found, key=lambda pair: pair[0]) if far < _FARTHEST_RAD]
 
 
@@ -212,7 +206,7 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
     for kind, joints, feed in parts:
         way, number = np.array(joints), np.arange(float(len(joints)))
         if kind == "process":
-            way, number = _fine(cell, line, stroke)
+            way, number = stroke.way, stroke.at
         tips = cell.chain.frames(way).tcp
         seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
         timing = timed(cell.chain, way, seconds)
@@ -235,33 +229,3 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
             )
         )
     return made
-
-
-def _fine(cell: Cell, line: Line, stroke: Stroke) -> tuple[np.ndarray, np.ndarray]:
-    """A stroke's joints (k, n) with places in between that are on the line too, and the waypoint
-    that each is at, a number between 0 and the last.
-
-    Between waypoints, joints that move evenly would take the tool off the straight line.
-    """
-    part = slice(stroke.first, stroke.last + 1)
-    positions, axes = line.positions[part], line.axes[part]
-    if len(positions) == 1:
-        return stroke.joints, np.zeros(1)
-    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(axes, axis=0), axis=1)
-    counts = np.ceil(np.maximum(moved / _FINE_M, turned / _FINE_RAD)).astype(int).clip(1, 50)
-    steps = [k + np.arange(count) / count for k, count in enumerate(counts)]
-    number = np.append(np.concatenate(steps), len(positions) - 1.0)
-
-    def between(values: np.ndarray) -> np.ndarray:
-        known = np.arange(len(values))
-        return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
-
-    along = between(axes)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    turn = np.full(len(number), stroke.turn)
-    at, along = cell.to_base(turn, between(positions), along)
-    guess = between(stroke.joints)
-    joints, good = solve(cell.chain, guess, at, along, 8)
-    joints[~good] = guess[~good]
-    return joints, number

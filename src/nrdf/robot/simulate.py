@@ -20,13 +20,14 @@ from nrdf.robot.arm import Arm
 from nrdf.robot.cell import Cell, Placement
 from nrdf.robot.collision import Collision, find_collisions
 from nrdf.robot.execute import Log, execute
-from nrdf.robot.follow import Stroke, follow
+from nrdf.robot.follow import follow
 from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line, lines_of
 from nrdf.robot.outcome import Outcome, outcome
 from nrdf.robot.placement import find_placement
 from nrdf.robot.program import PathProgram, find_home, program
 from nrdf.robot.solid import Solid, solid_from_points
+from nrdf.robot.strokes import Stroke
 from nrdf.robot.tool import tool_of
 
 log = logging.getLogger(__name__)
