@@ -39,7 +39,9 @@ class Ways:
         near = home + np.mod(some - home + np.pi, 2.0 * np.pi) - np.pi
         inside = (near > cell.chain.lower) & (near < cell.chain.upper)
         some = np.where(inside & ~cell.chain.slides, near, some)
-        self._bridges = some[self._clearance(some) > _WIDE_M]
+        frames = cell.chain.frames(some)
+        clear = cell.clearance(frames, np.full(len(some), turn)).least
+        self._bridges = some[np.minimum(clear, cell.own_clearance(frames)) > _WIDE_M]
         self.nodes = home[None].copy()
         self.parents = [-1]
 
@@ -92,9 +94,17 @@ class Ways:
         return 1.0
 
     def _clearance(self, joints: np.ndarray) -> np.ndarray:
+        """Of joints (k, n) along a move; from the arm itself only up to where something else is hit,
+        which is the quicker question."""
         frames = self.cell.chain.frames(joints)
         least = self.cell.clearance(frames, np.full(len(joints), self.turn)).least
-        return np.minimum(least, self.cell.own_clearance(frames))
+        hit = np.flatnonzero(least <= _CLEAR_M)
+        asked = int(hit[0]) if len(hit) else len(joints)
+        if asked:
+            frames = frames if asked == len(joints) else self.cell.chain.frames(joints[:asked])
+            own = self.cell.own_clearance(frames)
+            least[:asked] = np.minimum(least[:asked], own)
+        return least
 
     def explore(self, joints: np.ndarray) -> int | None:
         """As `link`, by a random tree that grows from there."""
