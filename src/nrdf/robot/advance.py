@@ -25,8 +25,8 @@ _STEP_RAD, _STEP_SHARE = 0.25, 2.0
 which the tool's axis turns and, 0.3 m a radian, the place moves; more is a jump to another
 configuration."""
 _IMPROVEMENTS = 5
-LEANS_RAD = (np.radians(5.0), np.radians(10.0))
-"""How far the tool's axis may lean from the planned one where that is blocked, the less first."""
+LEANS = (0.5, 1.0)
+"""Shares of the tool's lean that are tried where the planned axis is blocked, the less first."""
 _LEAN_WAYS = 8
 
 
@@ -93,11 +93,11 @@ def advance_leaning(
     """As `advance`, the tool leaning where it must; also the axes (b, 3) that it has then."""
     moved, good = advance(cell, turn, joints, before, positions, axes)
     held = axes.copy()
-    for angle in LEANS_RAD:
+    for share in LEANS:
         failed = np.flatnonzero(~good)
         if not len(failed):
             break
-        tried = leaned(axes[failed], angle)
+        tried = leaned(axes[failed], share * cell.tool.leans_rad)
         many = failed.repeat(_LEAN_WAYS)
         there, fine = advance(
             cell, turn[many], joints[many], before[many], positions[many], tried.reshape(-1, 3)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.robot.execute import PAD_GIVES_M
 from nrdf.robot.outcome import FORCE_BAND, VERDICTS
 from nrdf.robot.simulate import DrivenPath, Simulated
 from nrdf.robot.timing import STEP_S
+from nrdf.robot.tool import PAD_GIVES_M
 
 COLUMNS = ("reached", "coverage · planned", "force", "within ±20 %", "off plan, 99 %", "time")
 _MOST_LISTED = 2000

@@ -14,6 +14,10 @@ BEND_RAD, BEFORE_M, BEHIND_M = np.radians(60.0), 0.20, 0.10
 """A tool's neck is bent by that much, so far from the flange and from the tool centre point, unless
 the knowledge file gives the tool's `tcp_m`. Turned about its axis it keeps clear of what stands
 beside the surface, where a straight tool would not."""
+PAD_GIVES_M = 0.002
+"""How far the pad gives at the commanded force: its stiffness is the force by that."""
+MOST_LEAN_RAD = np.radians(15.0)
+NOZZLE_LEANS_RAD = np.radians(10.0)
 PAD_M = 0.015
 """Thickness of the soft end that presses on the surface; what is behind it must touch nothing."""
 _SENSOR_RADIUS, _SENSOR_LENGTH = 0.0375, 0.04
@@ -47,6 +51,14 @@ class Tool:
     T_flange_tcp: np.ndarray
     presses: bool
     pieces: tuple[Piece, ...]
+
+    @property
+    def leans_rad(self) -> float:
+        """How far the axis may be off the planned one where that is blocked: for a pad as far as it
+        gives, so that its whole face still presses."""
+        if not self.presses:
+            return NOZZLE_LEANS_RAD
+        return min(float(np.arcsin(min(PAD_GIVES_M / self.radius_m, 1.0))), MOST_LEAN_RAD)
 
     def spheres(self, link: int, T_link_flange: np.ndarray, step: float = FINE) -> Spheres:
         """Spheres around everything that must touch nothing, `step` radii apart."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nrdf.robot.advance import LEANS_RAD, advance, advance_leaning, leaned
+from nrdf.robot.advance import LEANS, advance, advance_leaning, leaned
 from nrdf.robot.cell import Cell
 from nrdf.robot.inverse import (
     LEAST_CLEARANCE_M,
@@ -116,7 +116,8 @@ def tracks_from(
     axes = np.array([lines[i].axes[k] for i, k in anchors])
     sides = 1
     if lean:
-        tried = np.concatenate([axes[:, None], *(leaned(axes, a) for a in LEANS_RAD)], axis=1)
+        slants = [leaned(axes, share * cell.tool.leans_rad) for share in LEANS]
+        tried = np.concatenate([axes[:, None], *slants], axis=1)
         sides = tried.shape[1]
         positions, axes = positions.repeat(sides, axis=0), tried.reshape(-1, 3)
     found, _ = places(cell, library, positions, axes, 2 if lean else GUESSES)
