@@ -26,7 +26,7 @@ _SHORTEST = 3  # waypoints of a piece that is worth a lift, unless nothing longe
 def follow(
     cell: Cell, library: Library, lines: Sequence[Line]
 ) -> tuple[list[Stroke], list[np.ndarray], list[Why]]:
-    """Strokes that cover the lines as far as the arm can, in driving order.
+    """Strokes that cover the lines as far as the arm can.
 
     Also for each line which waypoints (n,) are covered, and for those that are not, why; `Why` is
     of all of the line's waypoints, and only right where they are not covered.
@@ -55,7 +55,7 @@ def follow(
             for name in ("arrives", "clear", "regular"):
                 getattr(told, name)[missing] = getattr(found, name)
         why.append(told)
-    return _ordered(strokes), covered, why
+    return strokes, covered, why
 
 
 def _all_anchors(covered: Sequence[np.ndarray], round_: int) -> list[tuple[int, int]]:
@@ -140,9 +140,3 @@ def _tried(
     for k, stroke in zip(clear, driven, strict=True):
         made[k] = stroke
     return made
-
-
-def _ordered(strokes: list[Stroke]) -> list[Stroke]:
-    """By turn, the one where most is done first; within it in the path's order."""
-    done = np.bincount([s.turn for s in strokes], [len(s.joints) for s in strokes], minlength=1)
-    return sorted(strokes, key=lambda s: (-done[s.turn], s.turn, s.line, s.first))

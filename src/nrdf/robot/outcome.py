@@ -26,6 +26,7 @@ VERDICTS: tuple[Verdict, ...] = ("reached", "limit", "singular", "collision", "t
 FORCE_BAND = 0.2
 TOO_SLOW = 0.5
 """Share of its feed below which the joints' speed limits make a waypoint too fast for the arm."""
+_LEANS_RAD = np.radians(0.1)
 _PRESSES = 0.3  # of the commanded force, from which on the surface counts as worked
 _ON_PLAN_M = 0.003
 _FINE_M = 0.005
@@ -36,10 +37,11 @@ class Outcome:
     """Figures of one tool path.
 
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
-    reached waypoints, of the planned joints. coverage_*: share of the region's points inside its
-    margin. worked: (k,) of those points; region_points: their indices on the target. force_*: while
-    the tool moves along its lines; None where nothing is pressed. off_plan_99_m: of the tool from
-    its line, the way along the axis left out.
+    reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
+    waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
+    region's points inside its margin. worked: (k,) of those points; region_points: their indices on
+    the target. force_*: while the tool moves along its lines; None where nothing is pressed.
+    off_plan_99_m: of the tool from its line, the way along the axis left out.
     """
 
     verdicts: tuple[np.ndarray, ...]
@@ -48,6 +50,8 @@ class Outcome:
     pieces: int
     position_error_m: float
     axis_error_rad: float
+    leaning: int
+    most_lean_rad: float
     coverage_planned: float
     coverage_achieved: float
     region_points: np.ndarray
@@ -86,6 +90,7 @@ def outcome(
     """Figures of a tool path that was driven."""
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
+    leans = _leans(lines, program)
     region = lesson.regions[path.region]
     inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
     points, normals = surface.points[inside], surface.normals[inside]
@@ -113,6 +118,8 @@ def outcome(
         pieces=len(program.strokes),
         position_error_m=away,
         axis_error_rad=angle,
+        leaning=int((leans > _LEANS_RAD).sum()),
+        most_lean_rad=float(leans.max(initial=0.0)),
         coverage_planned=float(planned.mean()) if len(planned) else 0.0,
         coverage_achieved=float(worked.mean()) if len(worked) else 0.0,
         region_points=inside,
@@ -136,16 +143,18 @@ def _verdicts(
     covered: Sequence[np.ndarray],
     why: Sequence[Why],
 ) -> tuple[np.ndarray, ...]:
+    driven = [np.zeros(len(line.positions), bool) for line in lines]
+    for stroke in program.strokes:
+        driven[stroke.line][stroke.first : stroke.last + 1] = True
     made = []
-    for done, told in zip(covered, why, strict=True):
+    for does, done, told in zip(driven, covered, why, strict=True):
         verdict = np.full(len(done), "reached", dtype="<U9")
+        verdict[done & ~does] = "collision"  # left out: no way there, or it touched something
         verdict[~done & told.regular] = "collision"  # on the ways to and from it
         verdict[~done & ~told.regular] = "singular"
         verdict[~done & ~told.clear] = "collision"
         verdict[~done & ~told.arrives] = "limit"
         made.append(verdict)
-    for stroke in program.stranded:
-        made[stroke.line][stroke.first : stroke.last + 1] = "collision"
     for action in program.actions:
         if action.kind == "process":
             part = made[action.line][action.first : action.first + len(action.timed.slowed)]
@@ -166,6 +175,16 @@ def _errors(cell: Cell, lines: Sequence[Line], program: PathProgram) -> tuple[fl
         far, turned = errors(cell.chain.frames(stroke.joints), at, along)
         away, angle = max(away, float(far.max())), max(angle, float(turned.max()))
     return away, angle
+
+
+def _leans(lines: Sequence[Line], program: PathProgram) -> np.ndarray:
+    """Angles (k,), rad, between driven and planned axes of all driven waypoints."""
+    leans = [np.zeros(0)]
+    for stroke in program.strokes:
+        planned = lines[stroke.line].axes[stroke.first : stroke.last + 1]
+        cosine = np.einsum("na,na->n", stroke.axes, planned)
+        leans.append(np.arctan2(np.linalg.norm(np.cross(stroke.axes, planned), axis=1), cosine))
+    return np.concatenate(leans)
 
 
 def _planned(lines: Sequence[Line], height: float) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -22,7 +22,7 @@ TURN_RAD_S = np.radians(45.0)
 _MOST_WOUND = 3
 _FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
-_MOST_HOMES = 400
+_MOST_HOMES, _HOME_TURNS = 400, 36
 
 Kind = Literal["free", "approach", "process", "departure", "turn"]
 
@@ -33,6 +33,7 @@ class Action:
 
     turn: which of the object's turns. timed: joints at each step, the arm at rest at both ends.
     line, first: of a stroke, which line of its path and the waypoint it begins at; -1 elsewhere.
+    angles_rad: (t,) of the object at each step where it turns, none elsewhere.
     """
 
     kind: Kind
@@ -42,16 +43,16 @@ class Action:
     first: int = 0
     force_n: float | None = None
     dwell_s: float = 0.0
+    angles_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
 class PathProgram:
-    """The actions of one tool path; strokes: those driven; stranded: those that no free way leads
+    """The actions of one tool path; strokes: those driven, without those that no free way leads
     to."""
 
     actions: tuple[Action, ...]
     strokes: tuple[Stroke, ...]
-    stranded: tuple[Stroke, ...]
 
 
 def find_home(cell: Cell, library: Library) -> np.ndarray:
@@ -59,6 +60,8 @@ def find_home(cell: Cell, library: Library) -> np.ndarray:
     chosen = library.joints[:_MOST_HOMES]
     least = np.full(len(chosen), np.inf)
     frames = cell.chain.frames(chosen)
+    if len(cell.poses) > 1:
+        cell = cell.turned(np.arange(_HOME_TURNS) * 2.0 * np.pi / _HOME_TURNS)
     for turn in range(len(cell.poses)):
         found = cell.clearance(frames, np.full(len(chosen), turn)).least
         least = np.minimum(least, found)
@@ -79,11 +82,11 @@ def program(
 ) -> PathProgram:
     """Drive strokes from home and back to it: turn by turn, and each time the nearest one next."""
     actions: list[Action] = []
-    driven, stranded = [], []
+    driven = []
     ways: dict[int, Ways] = {}
     turn = -1
     node, at = 0, home
-    waiting = list(strokes)
+    waiting = _ordered(strokes)
     while waiting:
         progress()
         same = [s for s in waiting if s.turn == waiting[0].turn]
@@ -95,7 +98,6 @@ def program(
         stroke, start, stop = _joined(net, cell, stroke, home)
         whole = stroke.whole()
         if start is None or stop is None:
-            stranded.append(stroke)
             continue
         if stroke.turn != turn:
             if turn >= 0 and node:
@@ -108,7 +110,13 @@ def program(
         node, at = stop, whole[-1]
     if node:
         actions.append(_free(cell, turn, ways[turn].way(node, 0)))
-    return PathProgram(tuple(actions), tuple(driven), tuple(stranded))
+    return PathProgram(tuple(actions), tuple(driven))
+
+
+def _ordered(strokes: Sequence[Stroke]) -> list[Stroke]:
+    """By turn, the one where most is done first; within it in the path's order."""
+    done = np.bincount([s.turn for s in strokes], [len(s.joints) for s in strokes], minlength=1)
+    return sorted(strokes, key=lambda s: (-done[s.turn], s.turn, s.line, s.first))
 
 
 def _joined(
@@ -186,14 +194,15 @@ def _lengths(cell: Cell, way: np.ndarray) -> np.ndarray:
 
 def _turned(cell: Cell, before: int, after: int, home: np.ndarray) -> Action:
     """The object turns while the arm waits at home; no time for the first turn, set up by hand."""
-    seconds = 0.0
+    apart = 0.0
     if before >= 0:
-        apart = abs(cell.turns_rad[after] - cell.turns_rad[before]) % (2.0 * np.pi)
-        seconds = min(apart, 2.0 * np.pi - apart) / TURN_RAD_S
-    count = max(int(np.ceil(seconds / STEP_S)), 1)
+        apart = cell.turns_rad[after] - cell.turns_rad[before]
+        apart = (apart + np.pi) % (2.0 * np.pi) - np.pi  # the shorter way round
+    count = max(int(np.ceil(abs(apart) / TURN_RAD_S / STEP_S)), 1)
     still = np.repeat(home[None], count, axis=0)
     timing = Timed(still, 0.0 * still, np.zeros(count), np.ones(1))
-    return Action("turn", after, timing)
+    angles = cell.turns_rad[after] - apart * np.linspace(1.0, 0.0, count + 1)[1:]
+    return Action("turn", after, timing, angles_rad=angles)
 
 
 def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:

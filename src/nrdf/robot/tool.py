@@ -16,14 +16,13 @@ the knowledge file gives the tool's `tcp_m`. Turned about its axis it keeps clea
 beside the surface, where a straight tool would not."""
 PAD_GIVES_M = 0.002
 """How far the pad gives at the commanded force: its stiffness is the force by that."""
-MOST_LEAN_RAD = np.radians(15.0)
-NOZZLE_LEANS_RAD = np.radians(10.0)
 PAD_M = 0.015
 """Thickness of the soft end that presses on the surface; what is behind it must touch nothing."""
 _SENSOR_RADIUS, _SENSOR_LENGTH = 0.0375, 0.04
-_HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.5, 0.4, 0.005
+_HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.4, 0.4, 0.005
 _SHAFT_SHARE = 1.5  # of the neck's radius, between sensor and bend
 _NOZZLE_RADIUS = 0.010
+_MOST_LEAN_RAD, _NOZZLE_LEANS_RAD = np.radians(15.0), np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,8 @@ class Tool:
         """How far the axis may be off the planned one where that is blocked: for a pad as far as it
         gives, so that its whole face still presses."""
         if not self.presses:
-            return NOZZLE_LEANS_RAD
-        return min(float(np.arcsin(min(PAD_GIVES_M / self.radius_m, 1.0))), MOST_LEAN_RAD)
+            return _NOZZLE_LEANS_RAD
+        return min(float(np.arcsin(min(PAD_GIVES_M / self.radius_m, 1.0))), _MOST_LEAN_RAD)
 
     def spheres(self, link: int, T_link_flange: np.ndarray, step: float = FINE) -> Spheres:
         """Spheres around everything that must touch nothing, `step` radii apart."""
