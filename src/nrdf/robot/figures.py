@@ -117,7 +117,11 @@ def _path(driven: DrivenPath) -> dict[str, Any]:
         "axis_error_rad": out.axis_error_rad,
         "leaning": out.leaning,
         "most_lean_rad": out.most_lean_rad,
-        "coverage": {"planned": out.coverage_planned, "achieved": out.coverage_achieved},
+        "coverage": {
+            "planned": out.coverage_planned,
+            "driven": out.coverage_driven,
+            "achieved": out.coverage_achieved,
+        },
         "force": force,
         "off_plan_99_m": out.off_plan_99_m,
         "slower_than_feed_share": out.slow_share,

@@ -39,7 +39,8 @@ class Outcome:
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
     reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
     waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
-    region's points inside its margin. worked: (k,) of those points; region_points: their indices on
+    region's points inside its margin that the tool reaches by the plan, by what is left of it when
+    it is driven, and in the simulation. worked: (k,) of those points; region_points: their indices on
     the target. force_*: while the tool moves along its lines; None where nothing is pressed.
     off_plan_99_m: of the tool from its line, the way along the axis left out.
     """
@@ -53,6 +54,7 @@ class Outcome:
     leaning: int
     most_lean_rad: float
     coverage_planned: float
+    coverage_driven: float
     coverage_achieved: float
     region_points: np.ndarray
     worked: np.ndarray
@@ -95,11 +97,15 @@ def outcome(
     inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
     points, normals = surface.points[inside], surface.normals[inside]
     height = process.standoff_m
-    plan_places, plan_axes = _planned(lines, height)
-    planned = reached_by(points, normals, plan_places, plan_axes, path.tool_radius_m)
+
+    def reached(places: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        return reached_by(points, normals, places, axes, path.tool_radius_m)
+
+    planned = reached(*_swept([(line.positions, line.axes) for line in lines], height))
+    parts = [(lines[s.line].positions[s.first : s.last + 1], s.axes) for s in program.strokes]
+    driven = reached(*_swept(parts, height))
     work = [log for log in logs if log.action.kind == "process"]
-    places, axes = _driven(work, height)
-    worked = reached_by(points, normals, places, axes, path.tool_radius_m)
+    worked = reached(*_driven(work, height))
     pressing = [log for log in work if log.action.force_n is not None]
     asked = pressing[0].action.force_n if pressing else None
     force = np.concatenate([log.force_n[log.working] for log in pressing] or [np.zeros(0)])
@@ -121,6 +127,7 @@ def outcome(
         leaning=int((leans > _LEANS_RAD).sum()),
         most_lean_rad=float(leans.max(initial=0.0)),
         coverage_planned=float(planned.mean()) if len(planned) else 0.0,
+        coverage_driven=float(driven.mean()) if len(driven) else 0.0,
         coverage_achieved=float(worked.mean()) if len(worked) else 0.0,
         region_points=inside,
         worked=worked,
@@ -187,15 +194,17 @@ def _leans(lines: Sequence[Line], program: PathProgram) -> np.ndarray:
     return np.concatenate(leans)
 
 
-def _planned(lines: Sequence[Line], height: float) -> tuple[np.ndarray, np.ndarray]:
-    """The tool's places and axes along all lines as planned, finely."""
-    places, axes = [], []
-    for line in lines:
-        steps = np.linalg.norm(np.diff(line.positions, axis=0), axis=1)
+def _swept(
+    parts: Sequence[tuple[np.ndarray, np.ndarray]], height: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The tool's places and axes along waypoints (n, 3) and their axes (n, 3), finely."""
+    places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for positions, own in parts:
+        steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         way = np.concatenate([[0.0], np.cumsum(steps)])
         at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / _FINE_M)), 1) + 1)
-        place = np.stack([np.interp(at, way, line.positions[:, k]) for k in range(3)], axis=1)
-        axis = np.stack([np.interp(at, way, line.axes[:, k]) for k in range(3)], axis=1)
+        place = np.stack([np.interp(at, way, positions[:, k]) for k in range(3)], axis=1)
+        axis = np.stack([np.interp(at, way, own[:, k]) for k in range(3)], axis=1)
         places.append(place + height * axis)
         axes.append(axis)
     return np.concatenate(places), np.concatenate(axes)

@@ -16,7 +16,7 @@ the knowledge file gives the tool's `tcp_m`. Turned about its axis it keeps clea
 beside the surface, where a straight tool would not."""
 PAD_GIVES_M = 0.002
 """How far the pad gives at the commanded force: its stiffness is the force by that."""
-PAD_M = 0.015
+PAD_M = 0.020
 """Thickness of the soft end that presses on the surface; what is behind it must touch nothing."""
 _SENSOR_RADIUS, _SENSOR_LENGTH = 0.0375, 0.04
 _HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.4, 0.4, 0.005
