@@ -40,9 +40,9 @@ class Outcome:
     reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
     waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
     region's points inside its margin that the tool reaches by the plan, by what is left of it when
-    it is driven, and in the simulation. worked: (k,) of those points; region_points: their indices on
-    the target. force_*: while the tool moves along its lines; None where nothing is pressed.
-    off_plan_99_m: of the tool from its line, the way along the axis left out.
+    it is driven, and in the simulation. worked, planned: (k,) of those points; region_points: their
+    indices on the target. force_*: while the tool moves along its lines; None where nothing is
+    pressed. off_plan_99_m: of the tool from its line, the way along the axis left out.
     """
 
     verdicts: tuple[np.ndarray, ...]
