@@ -1,4 +1,8 @@
-"""The arm's next step towards a place, from where it is, without a jump."""
+"""The arm's next step towards a place, from where it is, without a jump.
+
+Where the planned axis is blocked, the tool may lean: a soft round pad works as well a few degrees
+aslant, and what stands beside the surface is often cleared by that.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,9 @@ _STEP_RAD, _STEP_SHARE = 0.25, 2.0
 which the tool's axis turns and, 0.3 m a radian, the place moves; more is a jump to another
 configuration."""
 _IMPROVEMENTS = 5
+LEANS = (0.5, 1.0)
+"""Shares of the tool's lean that are tried where the planned axis is blocked, the less first."""
+_LEAN_WAYS = 8
 
 
 def advance(
@@ -62,6 +69,49 @@ def advance(
         left = np.flatnonzero(good)
         good[left] = cell.own_clearance(chain.frames(moved[left])) > LEAST_CLEARANCE_M
     return moved, good
+
+
+def leaned(axes: np.ndarray, angle: float) -> np.ndarray:
+    """Axes (b, k, 3) that lean by an angle, rad, from axes (b, 3), to every side."""
+    helper = np.eye(3)[np.abs(axes).argmin(axis=1)]
+    one = np.cross(axes, helper)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    other = np.cross(axes, one)
+    way = np.arange(_LEAN_WAYS) * 2.0 * np.pi / _LEAN_WAYS
+    aside = np.cos(way)[:, None] * one[:, None] + np.sin(way)[:, None] * other[:, None]
+    return np.asarray(np.cos(angle) * axes[:, None] + np.sin(angle) * aside)
+
+
+def advance_leaning(
+    cell: Cell,
+    turn: np.ndarray,
+    joints: np.ndarray,
+    before: np.ndarray,
+    positions: np.ndarray,
+    axes: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `advance`, the tool leaning where it must; also the axes (b, 3) that it has then."""
+    moved, good = advance(cell, turn, joints, before, positions, axes)
+    held = axes.copy()
+    for share in LEANS:
+        failed = np.flatnonzero(~good)
+        if not len(failed):
+            break
+        tried = leaned(axes[failed], share * cell.tool.leans_rad)
+        many = failed.repeat(_LEAN_WAYS)
+        there, fine = advance(
+            cell, turn[many], joints[many], before[many], positions[many], tried.reshape(-1, 3)
+        )
+        fine = fine.reshape(len(failed), _LEAN_WAYS)
+        # Of the sides that are clear the one in their middle: farthest from what is in the way.
+        middle = np.einsum("bk,bka->ba", fine, tried)
+        closeness = np.where(fine, np.einsum("bka,ba->bk", tried, middle), -np.inf)
+        side, row = closeness.argmax(axis=1), np.arange(len(failed))
+        there = there.reshape(len(failed), _LEAN_WAYS, -1)[row, side]
+        found = fine.any(axis=1)
+        done = failed[found]
+        moved[done], held[done], good[done] = there[found], tried[row, side][found], True
+    return moved, good, held
 
 
 def advance_along(

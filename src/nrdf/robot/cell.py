@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,9 +75,8 @@ class Cell:
     """Everything that clearances are asked of, in the frame of the arm's base.
 
     chain: with the tool's centre point. spheres: of arm and tool; few: fewer and larger ones, for
-    arm against arm. poses: (k, 4, 4), T_base_object
-    at each turn. floor_m: its height. pairs: (p, 2) of those that must not
-    meet.
+    arm against arm. poses: (k, 4, 4), T_base_object at each turn. turntable_m: (3,) on the
+    turntable's axis. floor_m: its height. pairs: (p, 2) of those that must not meet.
     """
 
     arm: Arm
@@ -87,6 +86,7 @@ class Cell:
     few: Spheres
     solid: Solid
     poses: np.ndarray
+    turntable_m: np.ndarray
     floor_m: float
     pairs: np.ndarray
     turns_rad: tuple[float, ...]
@@ -104,6 +104,7 @@ class Cell:
             few=few,
             solid=solid,
             poses=placement.T_base_object(solid, up),
+            turntable_m=np.linalg.inv(placement.T_cell_base())[:3, 3],
             floor_m=-placement.base_m[2],
             pairs=_pairs(arm.chain, few),
             turns_rad=placement.turns_rad,
@@ -112,6 +113,21 @@ class Cell:
     def placed(self, placement: Placement, up: np.ndarray) -> Cell:
         """The same arm, tool and object at another place."""
         return Cell.build(self.arm, self.tool, self.solid, placement, up)
+
+    def shifted(self, shift_m: np.ndarray) -> Cell:
+        """The same with the object off its place by (3,), in its own frame."""
+        shift = np.eye(4)
+        shift[:3, 3] = shift_m
+        return replace(self, poses=self.poses @ shift)
+
+    def turned(self, angles_rad: np.ndarray) -> Cell:
+        """The same with the object at other turns (k,)."""
+        poses = []
+        for angle in angles_rad - self.turns_rad[0]:
+            about = _pose(float(angle), (0.0, 0.0, 0.0))
+            about[:3, 3] = self.turntable_m - about[:3, :3] @ self.turntable_m
+            poses.append(about @ self.poses[0])
+        return replace(self, poses=np.array(poses), turns_rad=tuple(angles_rad.tolist()))
 
     def to_base(
         self, turn: np.ndarray, points: np.ndarray, vectors: np.ndarray
@@ -146,9 +162,13 @@ class Cell:
         if not len(self.pairs):
             return np.full(len(frames.tcp), np.inf)
         centres = self.few.at(frames.rotations, frames.places).astype(np.float32)
-        one, two = self.pairs.T
-        offset = centres[:, one] - centres[:, two]
-        away = np.sqrt(np.einsum("bpa,bpa->bp", offset, offset))
+        (one, two), size = self.pairs.T, len(self.few.radii)
+        # All squared distances by one product: the pairs alone, with their offsets, take longer.
+        square = np.einsum("bma,bma->bm", centres, centres)
+        product = np.matmul(centres, np.swapaxes(centres, 1, 2)).reshape(len(centres), size * size)
+        away = square[:, one] + square[:, two]
+        away -= 2.0 * product[:, one * size + two]
+        away = np.sqrt(np.maximum(away, 0.0))
         away -= (self.few.radii[one] + self.few.radii[two]).astype(np.float32)
         return np.asarray(away.min(axis=1), float)
 

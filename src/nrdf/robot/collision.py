@@ -28,30 +28,44 @@ class Collision:
     depth_m: float
 
 
-def find_collisions(
+@dataclass(frozen=True)
+class Touch:
+    """A collision, the index of its action, and at which of its steps (t,) it is."""
+
+    collision: Collision
+    action: int
+    steps: np.ndarray
+
+
+def find_touches(
     cell: Cell, region: str, lines: Sequence[Line], logs: Sequence[Log]
-) -> list[Collision]:
+) -> list[Touch]:
     """Collisions of the joints that were really driven, at every step."""
     found = []
-    for log in logs:
-        for what, away in clearances(cell, log.joints, log.action.turn).items():
+    for index, log in enumerate(logs):
+        action = log.action
+        line = lines[action.line].number if action.line >= 0 else -1
+        if len(action.angles_rad):
+            there, turn = cell.turned(action.angles_rad), np.arange(len(log.joints))
+        else:
+            there, turn = cell, np.full(len(log.joints), action.turn)
+        for what, away in clearances(there, log.joints, turn).items():
             hit = away < 0.0
             if hit.any():
-                line = lines[log.action.line].number if log.action.line >= 0 else -1
-                seconds = float(hit.sum() * STEP_S)
-                depth = -float(away.min())
-                found.append(Collision(region, log.action.kind, line, what, seconds, depth))
+                seconds, depth = float(hit.sum() * STEP_S), -float(away.min())
+                collision = Collision(region, action.kind, line, what, seconds, depth)
+                found.append(Touch(collision, index, hit))
     return found
 
 
-def clearances(cell: Cell, joints: np.ndarray, turn: int) -> dict[str, np.ndarray]:
-    """Distances (t,), m, of joints (t, n) from the object, the floor, and the arm itself."""
+def clearances(cell: Cell, joints: np.ndarray, turn: np.ndarray) -> dict[str, np.ndarray]:
+    """Distances (t,), m, of joints (t, n) at turns (t,) from the object, the floor, and the arm
+    itself."""
     parts: dict[str, list[np.ndarray]] = {"object": [], "floor": [], "itself": []}
     for start in range(0, len(joints), _BATCH):
         frames = cell.chain.frames(joints[start : start + _BATCH])
-        turns = np.full(len(frames.tcp), turn)
-        near = cell.clearance(frames, turns)
-        far = np.full(len(turns), np.inf)
+        near = cell.clearance(frames, turn[start : start + _BATCH])
+        far = np.full(len(frames.tcp), np.inf)
         parts["object"].append(np.where(near.floor, far, near.least))
         parts["floor"].append(np.where(near.floor, near.least, far))
         parts["itself"].append(cell.own_clearance(frames))

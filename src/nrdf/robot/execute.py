@@ -19,9 +19,8 @@ from nrdf.robot.cell import Cell
 from nrdf.robot.program import Action
 from nrdf.robot.scene import Machine
 from nrdf.robot.timing import STEP_S
+from nrdf.robot.tool import PAD_GIVES_M
 
-PAD_GIVES_M = 0.002
-"""How far the pad gives at the commanded force: its stiffness is the force by that."""
 SETTLED_SHARE, SETTLES_S = 0.1, 1.5
 """The tool waits at a line's beginning until the force is that close, for at most that long."""
 _RESPONSE_S = 0.035  # of the force controller

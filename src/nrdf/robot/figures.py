@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.robot.execute import PAD_GIVES_M
 from nrdf.robot.outcome import FORCE_BAND, VERDICTS
 from nrdf.robot.simulate import DrivenPath, Simulated
 from nrdf.robot.timing import STEP_S
+from nrdf.robot.tool import PAD_GIVES_M
 
 COLUMNS = ("reached", "coverage · planned", "force", "within ±20 %", "off plan, 99 %", "time")
 _MOST_LISTED = 2000
@@ -20,14 +20,16 @@ NOTES = (
     "The object stands on a turntable, which turns while the arm waits at home. What holds the "
     "object is not modelled, nor are the cables of the tool.",
     "The tool is a round, soft pad on a bent neck; its spin about its axis is free. The pad may "
-    "touch whatever is beside the surface; everything behind it must touch nothing.",
+    "touch whatever is beside the surface; everything behind it must touch nothing. Where the "
+    "planned axis is blocked, the tool leans, as far as the pad's give takes up.",
     f"Contact: the pad gives {1e3 * PAD_GIVES_M:.0f} mm at the commanded force, pushed along "
     "the tool's axis from where the scan's smooth surface is. The arm, its motors and its force "
     "sensor are MuJoCo's.",
     "Force is counted while the tool moves along its lines; before each line it waits until the "
     "force is there.",
     "Collisions are looked for at every step of the simulation, between spheres that enclose every "
-    "shape of the arm and the tool, the object's distance field, the floor and the arm itself.",
+    "shape of the arm and the tool, the object's distance field, the floor and the arm itself. "
+    "Moves that touched something are left out, and the rest is planned and driven anew.",
 )
 
 
@@ -67,7 +69,9 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
             "waypoints": waypoints,
             "reached": reached,
             "reached_share": reached / waypoints,
+            "leaning": sum(p["leaning"] for p in paths),
             "collisions": sum(len(p["collisions"]) for p in paths),
+            "avoided": sum(len(p["avoided"]) for p in paths),
             "force_within": within / contact if contact else None,
             "time_s": simulated_s,
         },
@@ -111,13 +115,20 @@ def _path(driven: DrivenPath) -> dict[str, Any]:
         "not_reached": missed[:_MOST_LISTED],
         "position_error_m": out.position_error_m,
         "axis_error_rad": out.axis_error_rad,
-        "coverage": {"planned": out.coverage_planned, "achieved": out.coverage_achieved},
+        "leaning": out.leaning,
+        "most_lean_rad": out.most_lean_rad,
+        "coverage": {
+            "planned": out.coverage_planned,
+            "driven": out.coverage_driven,
+            "achieved": out.coverage_achieved,
+        },
         "force": force,
         "off_plan_99_m": out.off_plan_99_m,
         "slower_than_feed_share": out.slow_share,
         "time_s": out.cycle_time_s,
         "seconds": out.seconds,
         "collisions": [vars(collision) for collision in driven.collisions],
+        "avoided": [vars(collision) for collision in driven.avoided],
     }
 
 
@@ -146,7 +157,18 @@ def _warnings(paths: list[dict[str, Any]]) -> list[str]:
             lines.append(
                 f"{name}: {len(path['collisions'])} moves touch what they should not; the worst, "
                 f"{worst['kind']} of line {worst['line']}, the {worst['what']} by "
-                f"{1e3 * worst['depth_m']:.1f} mm"
+                f"{1e3 * worst['depth_m']:.1f} mm: do not run them"
+            )
+        if path["avoided"]:
+            kinds = ", ".join(sorted({c["kind"] for c in path["avoided"]}))
+            lines.append(
+                f"{name}: {len(path['avoided'])} moves ({kinds}) touched something when they were "
+                "tried, and are left out"
+            )
+        if path["leaning"]:
+            lines.append(
+                f"{name}: at {path['leaning']} waypoints the tool leans from the planned axis, by "
+                f"{np.degrees(path['most_lean_rad']):.0f}° at most, as something is in its way"
             )
         if path["slower_than_feed_share"] > 0.1:
             lines.append(

@@ -37,13 +37,18 @@ class Line:
         """The ways to and from a part of the line: its own ones at its ends, along the tool's axis
         where it begins or ends in between."""
         size = len(self.positions) - 1
-        into = self.lead_in if first == 0 else self._away(first)
-        out = self.lead_out if last == size else self._away(last)[::-1]
+        into = self.lead_in
+        if first:
+            into = self.straight_away(first, -self.axes[first])[::-1]
+        out = self.lead_out
+        if last < size:
+            out = self.straight_away(last, -self.axes[last])
         return into, out
 
-    def _away(self, index: int) -> np.ndarray:
-        far = np.arange(_SHORT_M, 0.5 * _STEP_M, -_STEP_M)
-        return np.asarray(self.positions[index] - far[:, None] * self.axes[index])
+    def straight_away(self, index: int, direction: np.ndarray) -> np.ndarray:
+        """Places (k, 3) away from a waypoint in a direction (3,), outwards."""
+        far = np.arange(_SHORT_M, 0.5 * _STEP_M, -_STEP_M)[::-1]
+        return np.asarray(self.positions[index] + far[:, None] * direction)
 
 
 def lines_of(path: ToolPath) -> tuple[Line, ...]:

@@ -16,16 +16,17 @@ from nrdf.process.toolpath import ToolPath
 from nrdf.process.track import covered as reached_by
 from nrdf.robot.cell import Cell
 from nrdf.robot.execute import Log
-from nrdf.robot.follow import Why
 from nrdf.robot.lines import Line
 from nrdf.robot.program import PathProgram
 from nrdf.robot.timing import STEP_S
+from nrdf.robot.tracks import Why
 
 Verdict = Literal["reached", "limit", "singular", "collision", "too fast"]
 VERDICTS: tuple[Verdict, ...] = ("reached", "limit", "singular", "collision", "too fast")
 FORCE_BAND = 0.2
 TOO_SLOW = 0.5
 """Share of its feed below which the joints' speed limits make a waypoint too fast for the arm."""
+_LEANS_RAD = np.radians(0.1)
 _PRESSES = 0.3  # of the commanded force, from which on the surface counts as worked
 _ON_PLAN_M = 0.003
 _FINE_M = 0.005
@@ -36,10 +37,12 @@ class Outcome:
     """Figures of one tool path.
 
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
-    reached waypoints, of the planned joints. coverage_*: share of the region's points inside its
-    margin. worked: (k,) of those points; region_points: their indices on the target. force_*: while
-    the tool moves along its lines; None where nothing is pressed. off_plan_99_m: of the tool from
-    its line, the way along the axis left out.
+    reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
+    waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
+    region's points inside its margin that the tool reaches by the plan, by what is left of it when
+    it is driven, and in the simulation. worked, planned: (k,) of those points; region_points: their
+    indices on the target. force_*: while the tool moves along its lines; None where nothing is
+    pressed. off_plan_99_m: of the tool from its line, the way along the axis left out.
     """
 
     verdicts: tuple[np.ndarray, ...]
@@ -48,7 +51,10 @@ class Outcome:
     pieces: int
     position_error_m: float
     axis_error_rad: float
+    leaning: int
+    most_lean_rad: float
     coverage_planned: float
+    coverage_driven: float
     coverage_achieved: float
     region_points: np.ndarray
     worked: np.ndarray
@@ -86,15 +92,20 @@ def outcome(
     """Figures of a tool path that was driven."""
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
+    leans = _leans(lines, program)
     region = lesson.regions[path.region]
     inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
     points, normals = surface.points[inside], surface.normals[inside]
     height = process.standoff_m
-    plan_places, plan_axes = _planned(lines, height)
-    planned = reached_by(points, normals, plan_places, plan_axes, path.tool_radius_m)
+
+    def reached(places: np.ndarray, axes: np.ndarray) -> np.ndarray:
+        return reached_by(points, normals, places, axes, path.tool_radius_m)
+
+    planned = reached(*_swept([(line.positions, line.axes) for line in lines], height))
+    parts = [(lines[s.line].positions[s.first : s.last + 1], s.axes) for s in program.strokes]
+    driven = reached(*_swept(parts, height))
     work = [log for log in logs if log.action.kind == "process"]
-    places, axes = _driven(work, height)
-    worked = reached_by(points, normals, places, axes, path.tool_radius_m)
+    worked = reached(*_driven(work, height))
     pressing = [log for log in work if log.action.force_n is not None]
     asked = pressing[0].action.force_n if pressing else None
     force = np.concatenate([log.force_n[log.working] for log in pressing] or [np.zeros(0)])
@@ -113,7 +124,10 @@ def outcome(
         pieces=len(program.strokes),
         position_error_m=away,
         axis_error_rad=angle,
+        leaning=int((leans > _LEANS_RAD).sum()),
+        most_lean_rad=float(leans.max(initial=0.0)),
         coverage_planned=float(planned.mean()) if len(planned) else 0.0,
+        coverage_driven=float(driven.mean()) if len(driven) else 0.0,
         coverage_achieved=float(worked.mean()) if len(worked) else 0.0,
         region_points=inside,
         worked=worked,
@@ -136,16 +150,18 @@ def _verdicts(
     covered: Sequence[np.ndarray],
     why: Sequence[Why],
 ) -> tuple[np.ndarray, ...]:
+    driven = [np.zeros(len(line.positions), bool) for line in lines]
+    for stroke in program.strokes:
+        driven[stroke.line][stroke.first : stroke.last + 1] = True
     made = []
-    for done, told in zip(covered, why, strict=True):
+    for does, done, told in zip(driven, covered, why, strict=True):
         verdict = np.full(len(done), "reached", dtype="<U9")
+        verdict[done & ~does] = "collision"  # left out: no way there, or it touched something
         verdict[~done & told.regular] = "collision"  # on the ways to and from it
         verdict[~done & ~told.regular] = "singular"
         verdict[~done & ~told.clear] = "collision"
         verdict[~done & ~told.arrives] = "limit"
         made.append(verdict)
-    for stroke in program.stranded:
-        made[stroke.line][stroke.first : stroke.last + 1] = "collision"
     for action in program.actions:
         if action.kind == "process":
             part = made[action.line][action.first : action.first + len(action.timed.slowed)]
@@ -162,21 +178,33 @@ def _errors(cell: Cell, lines: Sequence[Line], program: PathProgram) -> tuple[fl
         part = slice(stroke.first, stroke.last + 1)
         line = lines[stroke.line]
         turn = np.full(len(stroke.joints), stroke.turn)
-        at, along = cell.to_base(turn, line.positions[part], line.axes[part])
+        at, along = cell.to_base(turn, line.positions[part], stroke.axes)
         far, turned = errors(cell.chain.frames(stroke.joints), at, along)
         away, angle = max(away, float(far.max())), max(angle, float(turned.max()))
     return away, angle
 
 
-def _planned(lines: Sequence[Line], height: float) -> tuple[np.ndarray, np.ndarray]:
-    """The tool's places and axes along all lines as planned, finely."""
-    places, axes = [], []
-    for line in lines:
-        steps = np.linalg.norm(np.diff(line.positions, axis=0), axis=1)
+def _leans(lines: Sequence[Line], program: PathProgram) -> np.ndarray:
+    """Angles (k,), rad, between driven and planned axes of all driven waypoints."""
+    leans = [np.zeros(0)]
+    for stroke in program.strokes:
+        planned = lines[stroke.line].axes[stroke.first : stroke.last + 1]
+        cosine = np.einsum("na,na->n", stroke.axes, planned)
+        leans.append(np.arctan2(np.linalg.norm(np.cross(stroke.axes, planned), axis=1), cosine))
+    return np.concatenate(leans)
+
+
+def _swept(
+    parts: Sequence[tuple[np.ndarray, np.ndarray]], height: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The tool's places and axes along waypoints (n, 3) and their axes (n, 3), finely."""
+    places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    for positions, own in parts:
+        steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         way = np.concatenate([[0.0], np.cumsum(steps)])
         at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / _FINE_M)), 1) + 1)
-        place = np.stack([np.interp(at, way, line.positions[:, k]) for k in range(3)], axis=1)
-        axis = np.stack([np.interp(at, way, line.axes[:, k]) for k in range(3)], axis=1)
+        place = np.stack([np.interp(at, way, positions[:, k]) for k in range(3)], axis=1)
+        axis = np.stack([np.interp(at, way, own[:, k]) for k in range(3)], axis=1)
         places.append(place + height * axis)
         axes.append(axis)
     return np.concatenate(places), np.concatenate(axes)

@@ -9,11 +9,11 @@ import numpy as np
 from nrdf.process.toolpath import ToolPath
 from nrdf.robot.arm import Arm
 from nrdf.robot.cell import Cell, Placement
-from nrdf.robot.follow import places
 from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line
 from nrdf.robot.solid import Solid
 from nrdf.robot.tool import tool_of
+from nrdf.robot.tracks import places
 
 ASKED = 60
 """Waypoints that each place is judged by."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from nrdf.robot.cell import Cell
-from nrdf.robot.follow import Stroke, retreat
-from nrdf.robot.inverse import Library, solve
+from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line
+from nrdf.robot.strokes import Stroke, retreat
 from nrdf.robot.timing import FREE_SHARE, STEP_S, Timed, timed
 from nrdf.robot.transit import Ways
 
@@ -19,11 +19,10 @@ FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
 TURN_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
-_FINE_M, _FINE_RAD = 0.004, np.radians(3.0)  # between places on a line
 _MOST_WOUND = 3
 _FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
-_MOST_HOMES = 400
+_MOST_HOMES, _HOME_TURNS = 400, 36
 
 Kind = Literal["free", "approach", "process", "departure", "turn"]
 
@@ -34,6 +33,7 @@ class Action:
 
     turn: which of the object's turns. timed: joints at each step, the arm at rest at both ends.
     line, first: of a stroke, which line of its path and the waypoint it begins at; -1 elsewhere.
+    angles_rad: (t,) of the object at each step where it turns, none elsewhere.
     """
 
     kind: Kind
@@ -43,16 +43,16 @@ class Action:
     first: int = 0
     force_n: float | None = None
     dwell_s: float = 0.0
+    angles_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
 class PathProgram:
-    """The actions of one tool path; strokes: those driven; stranded: those that no free way leads
+    """The actions of one tool path; strokes: those driven, without those that no free way leads
     to."""
 
     actions: tuple[Action, ...]
     strokes: tuple[Stroke, ...]
-    stranded: tuple[Stroke, ...]
 
 
 def find_home(cell: Cell, library: Library) -> np.ndarray:
@@ -60,6 +60,8 @@ def find_home(cell: Cell, library: Library) -> np.ndarray:
     chosen = library.joints[:_MOST_HOMES]
     least = np.full(len(chosen), np.inf)
     frames = cell.chain.frames(chosen)
+    if len(cell.poses) > 1:
+        cell = cell.turned(np.arange(_HOME_TURNS) * 2.0 * np.pi / _HOME_TURNS)
     for turn in range(len(cell.poses)):
         found = cell.clearance(frames, np.full(len(chosen), turn)).least
         least = np.minimum(least, found)
@@ -80,11 +82,11 @@ def program(
 ) -> PathProgram:
     """Drive strokes from home and back to it: turn by turn, and each time the nearest one next."""
     actions: list[Action] = []
-    driven, stranded = [], []
+    driven = []
     ways: dict[int, Ways] = {}
     turn = -1
     node, at = 0, home
-    waiting = list(strokes)
+    waiting = _ordered(strokes)
     while waiting:
         progress()
         same = [s for s in waiting if s.turn == waiting[0].turn]
@@ -93,10 +95,9 @@ def program(
         net = ways.get(stroke.turn)
         if net is None:
             net = ways[stroke.turn] = Ways(cell, library, stroke.turn, home, rng)
-        stroke, start, stop = _joined(net, cell, lines[stroke.line], stroke, home)
+        stroke, start, stop = _joined(net, cell, stroke, home)
         whole = stroke.whole()
         if start is None or stop is None:
-            stranded.append(stroke)
             continue
         if stroke.turn != turn:
             if turn >= 0 and node:
@@ -109,11 +110,17 @@ def program(
         node, at = stop, whole[-1]
     if node:
         actions.append(_free(cell, turn, ways[turn].way(node, 0)))
-    return PathProgram(tuple(actions), tuple(driven), tuple(stranded))
+    return PathProgram(tuple(actions), tuple(driven))
+
+
+def _ordered(strokes: Sequence[Stroke]) -> list[Stroke]:
+    """By turn, the one where most is done first; within it in the path's order."""
+    done = np.bincount([s.turn for s in strokes], [len(s.joints) for s in strokes], minlength=1)
+    return sorted(strokes, key=lambda s: (-done[s.turn], s.turn, s.line, s.first))
 
 
 def _joined(
-    net: Ways, cell: Cell, line: Line, stroke: Stroke, home: np.ndarray
+    net: Ways, cell: Cell, stroke: Stroke, home: np.ndarray
 ) -> tuple[Stroke, int | None, int | None]:
     """A stroke, and the nodes of its start and end: with a joint a whole turn away, or farther off
     the surface, where that helps; None where nothing does."""
@@ -129,7 +136,7 @@ def _joined(
             index = 0 if begins else -1
             node = net.link(other.whole()[index])
             if node is None:
-                other = retreat(cell, line, other, begins)
+                other = retreat(cell, other, begins)
                 node = net.link(other.whole()[index])
             ends.append(net.explore(other.whole()[index]) if node is None else node)
             if ends[-1] is None:
@@ -155,14 +162,9 @@ def _wound(cell: Cell, stroke: Stroke, home: np.ndarray) -> list[Stroke]:
             if high[joint] + turn > cell.chain.upper[joint]:
                 continue
             shift = turn * np.eye(cell.chain.size)[joint]
-            other = replace(
-                stroke,
-                joints=stroke.joints + shift,
-                lead_in=stroke.lead_in + shift,
-                lead_out=stroke.lead_out + shift,
-            )
             # As far off as the joint itself is, not as whichever is farthest.
-            found.append((float(abs(whole[0, joint] + turn - home[joint])), other))
+            far = float(abs(whole[0, joint] + turn - home[joint]))
+            found.append((far, stroke.wound(shift)))
     return [other for far, other in sorted(found, key=lambda pair: pair[0]) if far < _FARTHEST_RAD]
 
 
@@ -192,14 +194,15 @@ def _lengths(cell: Cell, way: np.ndarray) -> np.ndarray:
 
 def _turned(cell: Cell, before: int, after: int, home: np.ndarray) -> Action:
     """The object turns while the arm waits at home; no time for the first turn, set up by hand."""
-    seconds = 0.0
+    apart = 0.0
     if before >= 0:
-        apart = abs(cell.turns_rad[after] - cell.turns_rad[before]) % (2.0 * np.pi)
-        seconds = min(apart, 2.0 * np.pi - apart) / TURN_RAD_S
-    count = max(int(np.ceil(seconds / STEP_S)), 1)
+        apart = cell.turns_rad[after] - cell.turns_rad[before]
+        apart = (apart + np.pi) % (2.0 * np.pi) - np.pi  # the shorter way round
+    count = max(int(np.ceil(abs(apart) / TURN_RAD_S / STEP_S)), 1)
     still = np.repeat(home[None], count, axis=0)
     timing = Timed(still, 0.0 * still, np.zeros(count), np.ones(1))
-    return Action("turn", after, timing)
+    angles = cell.turns_rad[after] - apart * np.linspace(1.0, 0.0, count + 1)[1:]
+    return Action("turn", after, timing, angles_rad=angles)
 
 
 def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
@@ -212,7 +215,7 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
     for kind, joints, feed in parts:
         way, number = np.array(joints), np.arange(float(len(joints)))
         if kind == "process":
-            way, number = _fine(cell, line, stroke)
+            way, number = stroke.way, stroke.at
         tips = cell.chain.frames(way).tcp
         seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
         timing = timed(cell.chain, way, seconds)
@@ -235,33 +238,3 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
             )
         )
     return made
-
-
-def _fine(cell: Cell, line: Line, stroke: Stroke) -> tuple[np.ndarray, np.ndarray]:
-    """A stroke's joints (k, n) with places in between that are on the line too, and the waypoint
-    that each is at, a number between 0 and the last.
-
-    Between waypoints, joints that move evenly would take the tool off the straight line.
-    """
-    part = slice(stroke.first, stroke.last + 1)
-    positions, axes = line.positions[part], line.axes[part]
-    if len(positions) == 1:
-        return stroke.joints, np.zeros(1)
-    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(axes, axis=0), axis=1)
-    counts = np.ceil(np.maximum(moved / _FINE_M, turned / _FINE_RAD)).astype(int).clip(1, 50)
-    steps = [k + np.arange(count) / count for k, count in enumerate(counts)]
-    number = np.append(np.concatenate(steps), len(positions) - 1.0)
-
-    def between(values: np.ndarray) -> np.ndarray:
-        known = np.arange(len(values))
-        return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
-
-    along = between(axes)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    turn = np.full(len(number), stroke.turn)
-    at, along = cell.to_base(turn, between(positions), along)
-    guess = between(stroke.joints)
-    joints, good = solve(cell.chain, guess, at, along, 8)
-    joints[~good] = guess[~good]
-    return joints, number

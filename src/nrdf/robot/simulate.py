@@ -18,14 +18,15 @@ from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Job, ToolPath, read_job
 from nrdf.robot.arm import Arm
 from nrdf.robot.cell import Cell, Placement
-from nrdf.robot.collision import Collision, find_collisions
-from nrdf.robot.execute import Log, execute
-from nrdf.robot.follow import Stroke, follow
+from nrdf.robot.collision import Collision
+from nrdf.robot.drive import drive
+from nrdf.robot.execute import Log
+from nrdf.robot.follow import follow
 from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line, lines_of
 from nrdf.robot.outcome import Outcome, outcome
 from nrdf.robot.placement import find_placement
-from nrdf.robot.program import PathProgram, find_home, program
+from nrdf.robot.program import PathProgram, find_home
 from nrdf.robot.solid import Solid, solid_from_points
 from nrdf.robot.tool import tool_of
 
@@ -61,16 +62,16 @@ class Work:
 
 @dataclass(frozen=True)
 class DrivenPath:
-    """One tool path on the arm."""
+    """One tool path on the arm. collisions, avoided: as a `Drive` has them."""
 
     path: ToolPath
     process: Process
     cell: Cell
     lines: tuple[Line, ...]
-    strokes: tuple[Stroke, ...]
     program: PathProgram
     logs: tuple[Log, ...]
     collisions: tuple[Collision, ...]
+    avoided: tuple[Collision, ...]
     outcome: Outcome
 
 
@@ -203,24 +204,20 @@ def simulate(
         lines = lines_of(path)
         strokes, covered, why = follow(cell, library, lines)
         clock("inverse kinematics")
-        progress(f"{where}: free moves")
         home = find_home(cell, library) if home is None else home
-        driven = program(cell, lines, strokes, home, library, rng)
-        clock("free moves")
         progress(f"{where}: simulation")
-        logs = execute(cell, driven.actions, surface, np.asarray(shift_m, float))
-        clock("simulation")
-        progress(f"{where}: collisions")
-        collisions = find_collisions(cell, path.region, lines, logs)
-        clock("collisions")
+        done = drive(
+            cell, path.region, lines, strokes, home, library, rng, surface,
+            np.asarray(shift_m, float), clock,
+        )  # fmt: skip
         result = outcome(
-            work.lesson, surface, path, process, cell, lines, driven, covered, why, logs
+            work.lesson, surface, path, process, cell, lines, done.program, covered, why, done.logs
         )
         clock("figures")
         paths.append(
             DrivenPath(
-                path, process, cell, lines, tuple(strokes), driven, tuple(logs),
-                tuple(collisions), result,
+                path, process, cell, lines, done.program, done.logs, done.collisions,
+                done.avoided, result,
             )
         )  # fmt: skip
     if not any(p.outcome.reached for p in paths):

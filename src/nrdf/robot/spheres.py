@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,11 +37,15 @@ class Spheres:
     def at(self, rotations: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Centres (b, m, 3) where the links' frames are (n + 1, b, 3, 3) and (n + 1, b, 3)."""
         centres = np.empty((places.shape[1], len(self.radii), 3))
-        for link in np.unique(self.links):
-            own = self.links == link
-            turned = np.einsum("bij,mj->bmi", rotations[link], self.centres[own], optimize=True)
+        for link, own, here in self._by_link:
+            turned = np.matmul(here, np.swapaxes(rotations[link], 1, 2))
             centres[:, own] = turned + places[link][:, None]
         return centres
+
+    @cached_property
+    def _by_link(self) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        parts = [(int(link), np.flatnonzero(self.links == link)) for link in np.unique(self.links)]
+        return [(link, own, self.centres[own]) for link, own in parts]
 
 
 def cover_capsule(

@@ -14,12 +14,15 @@ BEND_RAD, BEFORE_M, BEHIND_M = np.radians(60.0), 0.20, 0.10
 """A tool's neck is bent by that much, so far from the flange and from the tool centre point, unless
 the knowledge file gives the tool's `tcp_m`. Turned about its axis it keeps clear of what stands
 beside the surface, where a straight tool would not."""
-PAD_M = 0.015
+PAD_GIVES_M = 0.002
+"""How far the pad gives at the commanded force: its stiffness is the force by that."""
+PAD_M = 0.020
 """Thickness of the soft end that presses on the surface; what is behind it must touch nothing."""
 _SENSOR_RADIUS, _SENSOR_LENGTH = 0.0375, 0.04
-_HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.5, 0.4, 0.005
+_HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.4, 0.4, 0.005
 _SHAFT_SHARE = 1.5  # of the neck's radius, between sensor and bend
 _NOZZLE_RADIUS = 0.010
+_MOST_LEAN_RAD, _NOZZLE_LEANS_RAD = np.radians(15.0), np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,14 @@ class Tool:
     T_flange_tcp: np.ndarray
     presses: bool
     pieces: tuple[Piece, ...]
+
+    @property
+    def leans_rad(self) -> float:
+        """How far the axis may be off the planned one where that is blocked: for a pad as far as it
+        gives, so that its whole face still presses."""
+        if not self.presses:
+            return _NOZZLE_LEANS_RAD
+        return min(float(np.arcsin(min(PAD_GIVES_M / self.radius_m, 1.0))), _MOST_LEAN_RAD)
 
     def spheres(self, link: int, T_link_flange: np.ndarray, step: float = FINE) -> Spheres:
         """Spheres around everything that must touch nothing, `step` radii apart."""

@@ -12,8 +12,8 @@ import numpy as np
 from nrdf.robot.cell import Cell
 from nrdf.robot.inverse import LEAST_CLEARANCE_M, Library
 
-_STEP_RAD, _FINER = 0.08, 8
-_NEAR_M = 0.06
+_STEP_RAD, _FINE_M = 0.08, 0.008
+_SLACK = 0.7  # of the way between two places, by which the arm may come nearer than at both
 _CLEAR_M = 0.75 * LEAST_CLEARANCE_M  # the ends of strokes may be as near as they are
 _TRIED_EDGES, _TRIED_BRIDGES = 8, 25
 _BRIDGES, _WIDE_M = 1500, 0.02  # looked at, and how clear they must be
@@ -39,7 +39,9 @@ class Ways:
         near = home + np.mod(some - home + np.pi, 2.0 * np.pi) - np.pi
         inside = (near > cell.chain.lower) & (near < cell.chain.upper)
         some = np.where(inside & ~cell.chain.slides, near, some)
-        self._bridges = some[self._clearance(some) > _WIDE_M]
+        frames = cell.chain.frames(some)
+        clear = cell.clearance(frames, np.full(len(some), turn)).least
+        self._bridges = some[np.minimum(clear, cell.own_clearance(frames)) > _WIDE_M]
         self.nodes = home[None].copy()
         self.parents = [-1]
 
@@ -77,24 +79,39 @@ class Ways:
         """The share of a straight move that hits nothing, from its beginning."""
         count = max(int(np.ceil(np.abs(other - one).max() / _STEP_RAD)), 1)
         share = np.linspace(0.0, 1.0, count + 1)
-        clear = self._clearance(one + share[:, None] * (other - one))
+        clear, moved = self._clearance(one + share[:, None] * (other - one))
         blocked = clear[1:] <= _CLEAR_M
         if blocked.any():
             return float(share[int(np.argmax(blocked))]) * 0.7
         # Where something is nearer than the arm moves in a step, looks in between as well.
-        near = np.minimum(clear[:-1], clear[1:]) < _NEAR_M
-        between = share[:-1][near, None] + np.arange(1, _FINER) / _FINER / count
-        fine = between.ravel()
+        near = np.minimum(clear[:-1], clear[1:]) < _SLACK * moved
+        finer = np.ceil(moved[near] / _FINE_M).astype(int)
+        parts = [
+            s + np.arange(1, k) / k / count for s, k in zip(share[:-1][near], finer, strict=True)
+        ]
+        fine = np.concatenate([*parts, np.zeros(0)])
         if len(fine):
-            blocked = self._clearance(one + fine[:, None] * (other - one)) <= _CLEAR_M
+            blocked = self._clearance(one + fine[:, None] * (other - one))[0] <= _CLEAR_M
             if blocked.any():
                 return max(float(fine[int(np.argmax(blocked))]) - 1.0 / count, 0.0)
         return 1.0
 
-    def _clearance(self, joints: np.ndarray) -> np.ndarray:
+    def _clearance(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of joints (k, n) along a move, and how far (k - 1,), m, the arm's parts go between them.
+
+        From the arm itself only up to where something else is hit, which is the quicker question.
+        """
         frames = self.cell.chain.frames(joints)
+        parts = np.concatenate([frames.places, frames.tcp[None]])
+        moved = np.linalg.norm(np.diff(parts, axis=1), axis=2).max(axis=0)
         least = self.cell.clearance(frames, np.full(len(joints), self.turn)).least
-        return np.minimum(least, self.cell.own_clearance(frames))
+        hit = np.flatnonzero(least <= _CLEAR_M)
+        asked = int(hit[0]) if len(hit) else len(joints)
+        if asked:
+            frames = frames if asked == len(joints) else self.cell.chain.frames(joints[:asked])
+            own = self.cell.own_clearance(frames)
+            least[:asked] = np.minimum(least[:asked], own)
+        return least, moved
 
     def explore(self, joints: np.ndarray) -> int | None:
         """As `link`, by a random tree that grows from there."""
@@ -120,6 +137,8 @@ class Ways:
             if share < 0.2:
                 continue
             reached = nodes[start] + share * (aim - nodes[start])
+            if share < 1.0 and not self.free(nodes[start], reached):
+                continue  # what is before a hit has not been looked at closely
             nodes.append(reached)
             parents.append(start)
             for node in self._nearest_index(self.nodes, reached, 3):

@@ -1,0 +1,44 @@
+"""The demonstration's figures on the arm, against their bars."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import pytest
+
+# Not by importing it: nrdf must be first, to choose what MuJoCo draws with.
+if find_spec("mujoco") is None:
+    pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
+
+from nrdf.benchmark.robot import drive, figures
+from nrdf.errors import DataError
+
+
+def report(achieved: float, reached: float = 0.97):
+    path = {
+        "position_error_m": 2e-5,
+        "axis_error_rad": 3e-4,
+        "coverage": {"planned": 0.99, "driven": 0.95, "achieved": achieved},
+    }
+    return {
+        "paths": [path, {**path, "coverage": {"planned": 1.0, "driven": 1.0, "achieved": 1.0}}],
+        "total": {"reached_share": reached, "collisions": 0, "force_within": 0.97},
+        "speed": {"ik_ms_per_waypoint": 3.0, "times_real_time": 100.0},
+    }
+
+
+def test_figures_are_the_worst_regions_and_say_whether_they_meet_the_bar():
+    found = {f.name: f for f in figures({"one": report(0.94), "other": report(0.98, 0.9)})}
+    assert found["waypoints reached, %"].met == (True, False)
+    of_plan = found["coverage lost of the plan, worst region, %"]
+    assert of_plan.values == pytest.approx((5.0, 1.0)) and of_plan.met == (False, True)
+    of_driven = found["coverage lost of what is driven, worst region, %"]
+    assert of_driven.values == pytest.approx((1.0, 0.0)) and of_driven.met == (True, True)
+    assert all(
+        all(f.met) for name, f in found.items() if "lost" not in name and "reached" not in name
+    )
+
+
+def test_a_folder_that_is_no_demonstration(tmp_path):
+    with pytest.raises(DataError, match=r"has no ladder-back, .*nrdf demo --out"):
+        drive(tmp_path, lambda name: None)
