@@ -15,7 +15,9 @@ from nrdf.process.track import Neighbours, Track, line_spacing, track_of
 
 Way = tuple[np.ndarray, np.ndarray]
 """Places (n, 3) near the surface, and the outward normals (n, 3) of its side there."""
-_NEARBY = 2.0  # radii from a line; what is farther off may not belong to the region
+_NEARBY, _NEAR, _FACE = 2.0, 4.0, 3
+"""Radii from a line: points farther off than the first may not belong to the region, unless that
+many are a face of their own nearer than the second."""
 _ALIKE = 0.7  # cosine between the normals of places that one line may work
 _WIDE = 1.12  # stepovers between lines that need another
 _SHORTEST = 0.2  # spacings of waypoints
@@ -33,9 +35,9 @@ def touch_up(
     """Lines over those of the points `wanted` (k,) that a tool does not reach along `lines`.
 
     The border of a region is ragged, and at its corners a few points may stand alone on a face of
-    their own. Points within two radii of a line that are next to each other share a line, along
-    their longest extent. Points farther off stay as they are, and so do stripes between lines that
-    are wanted farther apart than the tool is wide.
+    their own. Points within two radii of a line, or three that are a face within four, share a
+    line with those next to them, along their longest extent. Points farther off stay as they are,
+    and so do stripes between lines that are wanted farther apart than the tool is wide.
     """
     reach = max(radius_m, 0.55 * stepover_m)
     made: list[Line] = []
@@ -43,8 +45,12 @@ def touch_up(
         track = track_of([*lines, *made], radius_m, stepover_m)
         visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
         left = wanted[visits == 0]
-        near = cKDTree(track.places).query(surface.points[left])[0] < _NEARBY * radius_m
-        ways = [_along(surface, g, spacing_m) for g in _groups(surface, left[near], radius_m)]
+        away = cKDTree(track.places).query(surface.points[left])[0]
+        left, away = left[away < _NEAR * radius_m], away[away < _NEAR * radius_m]
+        nearby = set(left[away < _NEARBY * radius_m].tolist())
+        groups = _groups(surface, left, radius_m)
+        groups = [g for g in groups if len(g) >= _FACE or not nearby.isdisjoint(g.tolist())]
+        ways = [_along(surface, group, spacing_m) for group in groups]
         new = _lines(surface, ways, surface.spacing, radius_m)
         if not new:
             break
