@@ -116,7 +116,8 @@ def _between(
                 + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
             )
             turned = normal[run[[0, *range(len(run)), -1]]]
-            way, walked = _resampled(np.concatenate([first[None], middle[run], last[None]]), spacing_m)
+            whole = np.concatenate([first[None], middle[run], last[None]])
+            way, walked = _resampled(whole, spacing_m)
             ways.append((way, unit(np.stack([np.interp(*walked, n) for n in turned.T], axis=1))))
             tried.append(way)
     return ways
