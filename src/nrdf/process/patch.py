@@ -163,13 +163,16 @@ def _cut(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
             edges = _edges_within(surface, around)
             flat = unroll(surface.points[around], surface.normals[around], edges, surface.spacing)
             mine = np.isin(around, own)
-            bent = (flat.error[mine] > most) | _folded(surface.points[around], flat.uv)[mine]
-            if bent.mean() <= _BENT_SHARE:
+            bent = (flat.error > most) | _folded(surface.points[around], flat.uv)
+            share = bent[mine].mean()
+            if share <= _BENT_SHARE:
                 break
-        if depth < _DEEPEST and bent.mean() > _BENT_SHARE:
+        if depth < _DEEPEST and share > _BENT_SHARE:
             waiting += [(part, depth + 1) for part in _halves(surface, own)]
         else:
-            found.append((own, around, flat))
+            # At a saddle there is too much surface for the plane: surroundings lie over the patch.
+            kept = mine | ~bent
+            found.append((own, around[kept], flat.among(kept)))
     if not found:
         raise ProcessError(
             f"the region's {len(region)} points are too few or too scattered for a tool path; it "

@@ -23,8 +23,6 @@ from nrdf.process.track import line_spacing, track_of
 
 Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
-RASTERS = ("raster", "cross-hatch")
-"""Trajectories of straight lines; rings and spirals follow the border, whose corners they round."""
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
 _TRIES, _WIDE = 3, 1.1  # of lines that are more stepovers apart
@@ -100,9 +98,8 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
         ]
         drawn = [line for block in nearest_first(found) for line in block]
         lines += drawn
-        if strategy.trajectory in RASTERS:
-            reach, apart = strategy.tool_radius_m, strategy.stepover_m
-            lines += fill_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
+        reach, apart = strategy.tool_radius_m, strategy.stepover_m
+        lines += fill_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
     if not lines:
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
@@ -193,7 +190,8 @@ def _even(
     """Blocks of lines on a patch, nowhere much farther apart than a stepover.
 
     On few points, or round an edge, the patch's plane tells distances along the surface less well
-    than lines that are there: if they are too far apart, they are drawn again, closer.
+    than lines that are there, and turns of a spiral are farther apart in corners: if lines are too
+    far apart, they are drawn again, closer.
     """
     wanted = stepover = strategy.stepover_m
     best, least = [], np.inf
@@ -211,7 +209,7 @@ def _even(
             best, least = blocks, wide
         # Where but a few places are too far from the next line, the line is broken there.
         usual = float(np.quantile(apart, 0.9)) if len(apart) else 0.0
-        if wide == 0.0 or usual <= wanted or strategy.trajectory not in RASTERS:
+        if wide == 0.0 or usual <= wanted:
             break
         stepover *= max(wanted / usual, 0.75)
     return best

@@ -185,7 +185,8 @@ class Surface:
         among = np.cumsum(share, axis=1) - share < _FITTED
         reach = 1.05 * (distance * (among & (share > 0.0))).max(axis=1, keepdims=True) + 1e-12
         weight = share * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
-        fitted = (weight > 0).sum(axis=1) >= _LEAST
+        count = (weight > 0).sum(axis=1)
+        fitted = count > 0
         # A place that no point is near is beyond the surface's edge.
         fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
         enough = fitted[:, None]
@@ -195,6 +196,11 @@ class Surface:
         offset = np.einsum("mkb,mab->mka", self.points[near] - points[:, None], frame)
         found = quadrics(offset[..., :2] / self.spacing, offset[..., 2:], weight)
         # Beyond an edge, quadrics run away.
+        few = fitted & (count < _LEAST)
+        if few.any():
+            share = weight[few] / np.maximum(weight[few].sum(axis=1, keepdims=True), 1e-12)
+            found[few] = 0.0
+            found[few, 0, 0] = np.einsum("mk,mk->m", share, offset[few, :, 2])
         height = np.where(enough, np.clip(found[:, 0], -self.spacing, self.spacing), 0.0)
         slope = np.where(enough, found[:, 1:3, 0] / self.spacing, 0.0)
         tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])

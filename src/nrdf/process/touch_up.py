@@ -14,8 +14,10 @@ from nrdf.process.surface import Surface, tangent_frames, unit
 from nrdf.process.track import Neighbours, Track, line_spacing, track_of
 
 Way = tuple[np.ndarray, np.ndarray]
-"""Places (n, 3) near the surface, and the outward normal (3,) of its side there."""
-_NEARBY = 2.0  # radii from a line; what is farther off may not belong to the region
+"""Places (n, 3) near the surface, and the outward normals (n, 3) of its side there."""
+_NEARBY, _NEAR, _FACE = 2.0, 4.0, 3
+"""Radii from a line: points farther off than the first may not belong to the region, unless that
+many are a face of their own nearer than the second."""
 _ALIKE = 0.7  # cosine between the normals of places that one line may work
 _WIDE = 1.12  # stepovers between lines that need another
 _SHORTEST = 0.2  # spacings of waypoints
@@ -33,9 +35,9 @@ def touch_up(
     """Lines over those of the points `wanted` (k,) that a tool does not reach along `lines`.
 
     The border of a region is ragged, and at its corners a few points may stand alone on a face of
-    their own. Points within two radii of a line that are next to each other share a line, along
-    their longest extent. Points farther off stay as they are, and so do stripes between lines that
-    are wanted farther apart than the tool is wide.
+    their own. Points within two radii of a line, or three that are a face within four, share a
+    line with those next to them, along their longest extent. Points farther off stay as they are,
+    and so do stripes between lines that are wanted farther apart than the tool is wide.
     """
     reach = max(radius_m, 0.55 * stepover_m)
     made: list[Line] = []
@@ -43,8 +45,12 @@ def touch_up(
         track = track_of([*lines, *made], radius_m, stepover_m)
         visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
         left = wanted[visits == 0]
-        near = cKDTree(track.places).query(surface.points[left])[0] < _NEARBY * radius_m
-        ways = [_along(surface, g, spacing_m) for g in _groups(surface, left[near], radius_m)]
+        away = cKDTree(track.places).query(surface.points[left])[0]
+        left, away = left[away < _NEAR * radius_m], away[away < _NEAR * radius_m]
+        nearby = set(left[away < _NEARBY * radius_m].tolist())
+        groups = _groups(surface, left, radius_m)
+        groups = [g for g in groups if len(g) >= _FACE or not nearby.isdisjoint(g.tolist())]
+        ways = [_along(surface, group, spacing_m) for group in groups]
         new = _lines(surface, ways, surface.spacing, radius_m)
         if not new:
             break
@@ -64,9 +70,11 @@ def fill_gaps(
     made: list[Line] = []
     if not lines:
         return made
+    tried: list[np.ndarray] = []
     for _ in range(_ROUNDS):
         track = track_of([*lines, *made], radius_m, stepover_m)
-        ways = _between(track, line_spacing(patches, track, stepover_m), spacing_m, stepover_m)
+        beside = line_spacing(patches, track, stepover_m)
+        ways = _between(patches, track, beside, spacing_m, stepover_m, tried)
         new = _lines(surface, ways, max(surface.spacing, 0.5 * stepover_m), radius_m)
         if not new:
             break
@@ -75,41 +83,65 @@ def fill_gaps(
 
 
 def _between(
-    track: Track, neighbours: Neighbours, spacing_m: float, stepover_m: float
+    patches: Sequence[Patch],
+    track: Track,
+    neighbours: Neighbours,
+    spacing_m: float,
+    stepover_m: float,
+    tried: list[np.ndarray],
 ) -> list[Way]:
-    """Ways through the middle of every gap that is too wide."""
+    """Ways through the middle of every gap that is too wide, apart from those `tried` before, to
+    which they are added."""
     wide = np.flatnonzero(neighbours.distance > _WIDE * stepover_m)
     wide = wide[np.argsort(neighbours.place[wide], kind="stable")]
-    at = neighbours.place[wide]
-    right = np.cross(track.travel[at], track.axes[at])
-    side = np.einsum("na,na->n", right, neighbours.beside[wide] - track.places[at])
+    middle, normal = _on_patches(patches, neighbours.patch[wide], neighbours.middle[wide])
+    place = neighbours.place[wide]
+    right = np.cross(track.travel[place], track.axes[place])
+    side = np.einsum("na,na->n", right, neighbours.beside[wide] - track.places[place]) > 0.0
     ways: list[Way] = []
-    for chosen in (wide[side > 0.0], wide[side <= 0.0]):
-        ends = np.flatnonzero(np.diff(neighbours.place[chosen]) > 2) + 1
+    for chosen in (np.flatnonzero(side), np.flatnonzero(~side)):
+        ends = np.flatnonzero(np.diff(place[chosen]) > 2) + 1
         for run in np.split(chosen, ends):
             if not len(run):
                 continue
-            at = neighbours.place[run]
-            middle = 0.5 * (track.places[at] + neighbours.beside[run])
             # Two lines see the gap between them, each from its side.
-            if ways:
-                seen = cKDTree(np.concatenate([way for way, _ in ways])).query(middle)[0]
-                if np.median(seen) < 0.4 * stepover_m:
+            if tried:
+                seen = cKDTree(np.concatenate(tried)).query(middle[run])[0]
+                if np.median(seen) < 0.25 * stepover_m:
                     continue
+            at = place[run]
             longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
             first, last = (
-                middle[[0, -1]] + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
+                middle[run[[0, -1]]]
+                + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
             )
-            way = _resampled(np.concatenate([first[None], middle, last[None]]), spacing_m)
-            ways.append((way, -unit(track.axes[at].mean(axis=0))))
+            turned = normal[run[[0, *range(len(run)), -1]]]
+            whole = np.concatenate([first[None], middle[run], last[None]])
+            way, walked = _resampled(whole, spacing_m)
+            ways.append((way, unit(np.stack([np.interp(*walked, n) for n in turned.T], axis=1))))
+            tried.append(way)
     return ways
 
 
-def _resampled(way: np.ndarray, spacing_m: float) -> np.ndarray:
-    """Places (m, 3) evenly along a way (n, 3)."""
+def _on_patches(
+    patches: Sequence[Patch], patch: np.ndarray, uv: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 3) and normals (n, 3) at uv (n, 2) in the planes of the patches numbered (n,)."""
+    places, normals = np.zeros((2, len(uv), 3))
+    for number in np.unique(patch):
+        here = patch == number
+        places[here], along = patches[number].at(uv[here])
+        normals[here] = unit(np.cross(along[:, 0], along[:, 1]))
+    return places, normals
+
+
+def _resampled(
+    way: np.ndarray, spacing_m: float
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Places (m, 3) evenly along a way (n, 3); how far along they (m,) and the way's (n,) are."""
     walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
     at = np.linspace(0.0, walked[-1], max(int(np.rint(walked[-1] / spacing_m)), 1) + 1)
-    return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1)
+    return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1), (at, walked)
 
 
 def _groups(surface: Surface, left: np.ndarray, radius_m: float) -> list[np.ndarray]:
@@ -140,7 +172,8 @@ def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
     ahead = offset @ along
     half = 0.5 * max(_SHORTEST * spacing_m, float(np.ptp(ahead)))
     at = np.linspace(-half, half, max(int(np.rint(2.0 * half / spacing_m)), 1) + 1)
-    return middle + (0.5 * (ahead.min() + ahead.max()) + at[:, None]) * along, normal
+    way = middle + (0.5 * (ahead.min() + ahead.max()) + at[:, None]) * along
+    return way, np.broadcast_to(normal, way.shape)
 
 
 def _lines(surface: Surface, ways: Sequence[Way], near: float, radius_m: float) -> list[Line]:
@@ -148,7 +181,7 @@ def _lines(surface: Surface, ways: Sequence[Way], near: float, radius_m: float) 
     if not ways:
         return []
     places = np.concatenate([way for way, _ in ways])
-    facing = np.concatenate([np.broadcast_to(normal, way.shape) for way, normal in ways])
+    facing = np.concatenate([normals for _, normals in ways])
     contacts, normals, there = touching(surface, places, facing, near, radius_m)
     cuts = np.cumsum([len(way) for way, _ in ways])[:-1]
     parts = zip(*(np.split(v, cuts) for v in (contacts, normals, there)), strict=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,6 +19,7 @@ _FACING = 0.2
 # Lines are beside each other where they run the same way or back, within 30 degrees, and the region
 # goes on between them beyond doubt: its border is known to about half the points' spacing.
 _PARALLEL, _SURE, _LOOKS = np.cos(np.pi / 6), 0.5, 9
+_NEXT_TO = 8  # points of which one is next to a place, on its side
 
 
 @dataclass(frozen=True)
@@ -99,11 +100,24 @@ def track_of(lines: Sequence[Line], radius_m: float, stepover_m: float) -> Track
 @dataclass(frozen=True)
 class Neighbours:
     """Places of a track, by index (k,), places (k, 3) on the next lines beside them, and distances
-    (k,), m, along the surface."""
+    (k,), m, along the surface. patch: number (k,) of the patch that they were found in; middle:
+    (k, 2), half-way between the two in its plane."""
 
     place: np.ndarray
     beside: np.ndarray
     distance: np.ndarray
+    patch: np.ndarray
+    middle: np.ndarray
+
+    @staticmethod
+    def none() -> Neighbours:
+        nobody = np.zeros(0, int)
+        return Neighbours(nobody, np.zeros((0, 3)), np.zeros(0), nobody, np.zeros((0, 2)))
+
+    @staticmethod
+    def joined(parts: Sequence[Neighbours]) -> Neighbours:
+        names = [field.name for field in fields(Neighbours)]
+        return Neighbours(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Neighbours:
@@ -123,20 +137,20 @@ def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Nei
         away = _placed(patch, track.places, tails, patch.label == OWN)[0]
         owner = np.where(away < nearest, number, owner)
         nearest = np.minimum(away, nearest)
-    found = [Neighbours(np.zeros(0, int), np.zeros((0, 3)), np.zeros(0))]
+    found = [Neighbours.none()]
     for number, patch in enumerate(patches):
         # Lines beyond a seam between patches are neighbours as well.
         _, point, uv = _placed(patch, track.places, tails, np.ones(len(patch.label), bool))
         off = np.linalg.norm(track.places - patch.points[point], axis=1)
         facing = np.einsum("na,na->n", patch.normals[point], tails)
-        mine = np.flatnonzero((owner == number) | ((off < patch.spacing) & (facing > _FACING)))
+        # A line over a few points on a face of their own is beside none.
+        mine = np.flatnonzero(((owner == number) | (off < patch.spacing)) & (facing > _FACING))
         if len(mine):
             travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
             asking = owner[mine] == number
-            found.append(_beside(patch, track, mine, uv[mine], travel, asking, stepover))
-    return Neighbours(
-        *(np.concatenate([getattr(n, f) for n in found]) for f in ("place", "beside", "distance"))
-    )
+            near = _beside(patch, track, mine, uv[mine], travel, asking, stepover)
+            found.append(replace(near, patch=np.full(len(near.place), number)))
+    return Neighbours.joined(found)
 
 
 def _beside(
@@ -182,10 +196,11 @@ def _beside(
     chord = np.linalg.norm(beside - track.places[mine[i]], axis=1)
     turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
     half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
-    nearest = tree.query(place[i] + 0.5 * crossing)[0]
-    nearest /= np.maximum(np.linalg.norm(crossing, axis=1), 1e-12)
+    middle = place[i] + 0.5 * crossing
+    nearest = tree.query(middle)[0] / np.maximum(np.linalg.norm(crossing, axis=1), 1e-12)
     arc = chord / np.sinc(half / np.pi)
-    return Neighbours(mine[i], beside, arc * np.minimum(1.0, 2.0 * nearest))
+    distance = arc * np.minimum(1.0, 2.0 * nearest)
+    return Neighbours(mine[i], beside, distance, np.zeros(len(i), int), middle)
 
 
 def _placed(
@@ -193,12 +208,16 @@ def _placed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Distance (n,) of places (n, 3) from a patch, its point (n,) next to each, uv (n, 2) there.
 
-    among: which of the patch's points count. tails: (n, 3), tells the side, that of the tool: on a
-    thin part the nearest patch is the one that faces it, so distances are less the more it does.
+    among: which of the patch's points count. tails: (n, 3), tells the side, that of the tool:
+    distances are less the more a point faces it. On a thin part the nearest patch is the one that
+    faces the tool, and next to an edge the nearest point is the one on the tool's face.
     """
     chosen = np.flatnonzero(among)
-    distance, near = cKDTree(patch.points[chosen]).query(places)
+    count = np.arange(1, min(_NEXT_TO, len(chosen)) + 1)
+    distance, near = cKDTree(patch.points[chosen]).query(places, count)
     near = chosen[near]
-    distance -= 3.0 * patch.spacing * np.einsum("na,na->n", patch.normals[near], tails)
+    distance -= 3.0 * patch.spacing * np.einsum("nka,na->nk", patch.normals[near], tails)
+    best = np.arange(len(places)), distance.argmin(axis=1)
+    distance, near = distance[best], near[best]
     offset = np.einsum("nba,na->nb", patch.tangents[near], places - patch.points[near])
     return distance, near, patch.uv[near] + offset

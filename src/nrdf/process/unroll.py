@@ -26,6 +26,10 @@ class Unrolled:
     tangents: np.ndarray
     error: np.ndarray
 
+    def among(self, kept: np.ndarray) -> Unrolled:
+        """The patch with those of its points alone that are `kept`, mask (n,)."""
+        return Unrolled(self.uv[kept], self.tangents[kept], self.error[kept])
+
 
 def unroll(points: np.ndarray, normals: np.ndarray, edges: np.ndarray, spacing: float) -> Unrolled:
     """Unroll connected points (n, 3) with unit normals (n, 3), along edges (e, 2).
