@@ -18,12 +18,12 @@ from torch import Tensor, nn
 from nrdf.errors import ModelError
 from nrdf.field.base import FieldConfig
 from nrdf.field.weights import load_tensors
-from nrdf.field.zoo import ZOO, find_weights, list_models
+from nrdf.field.zoo import YAW, ZOO, find_weights, list_models
 
-YAW_ZOO = ZOO / "yaw"
+YAW_ZOO = ZOO / YAW
 """Folder of the networks that ship, with an index of its own; a network's name is its category."""
-PRESET = "yaw"
 _TURNS = 6  # in which a cloud is shown, each as it is and mirrored
+_CLOUDS = 2  # of different points, likewise
 _FAR = 0.95  # share of the points whose distance from their middle is the unit of length
 
 
@@ -41,7 +41,7 @@ class YawConfig(FieldConfig):
 class YawNetwork(nn.Module):
     """Logits over yaws of clouds with +Y up."""
 
-    preset: ClassVar[str] = PRESET
+    preset: ClassVar[str] = YAW
 
     def __init__(self, config: YawConfig | None = None) -> None:
         super().__init__()
@@ -72,26 +72,26 @@ class YawNetwork(nn.Module):
     def log_probability(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(bins,) log probabilities of the yaws 2π i / bins of a cloud (n, 3), +Y up, any unit.
 
-        normals: (n, 3) outward. The points are in random order.
+        normals: (n, 3) outward. The points are in random order; as many are looked at as make up
+        two of the clouds that the network was trained on, or once over if there are fewer.
         """
+        bins, count = self.config.bins, self.config.points
+        clouds = max(1, min(_CLOUDS, len(points) // count))
         p, n = (
-            torch.as_tensor(v[: self.config.points], dtype=torch.float32) for v in (points, normals)
+            torch.as_tensor(v[: clouds * count], dtype=torch.float32).reshape(clouds, -1, 3)
+            for v in (points, normals)
         )
-        bins = self.config.bins
         steps = [bins // _TURNS * i for i in range(_TURNS)]
-        turns = torch.stack([turn(torch.tensor(2 * math.pi / bins * step)) for step in steps])
-        p, n = (torch.einsum("tij,nj->tni", turns, v) for v in (p, n))
+        turns = turn(2 * math.pi / bins * torch.tensor(steps))
+        p, n = (torch.einsum("tij,cnj->tcni", turns, v) for v in (p, n))
         mirror = torch.tensor([1.0, 1.0, -1.0])
-        logits = self(torch.cat([p, p * mirror]), torch.cat([n, n * mirror])).log_softmax(1)
-        ahead = torch.stack(
-            [row.roll(-step) for row, step in zip(logits[:_TURNS], steps, strict=True)]
-        )
+        shown = [torch.stack([v, v * mirror], 1).flatten(0, 2) for v in (p, n)]
+        logits = self(*shown).log_softmax(1).view(_TURNS, 2, clouds, bins)
         # A mirror image faces minus the yaw.
-        reflected = logits[_TURNS:].flip(1).roll(1, 1)
-        behind = torch.stack(
-            [row.roll(-step) for row, step in zip(reflected, steps, strict=True)]
-        )
-        return torch.cat([ahead, behind]).mean(0).log_softmax(0).numpy()
+        logits[:, 1] = logits[:, 1].flip(-1).roll(1, -1)
+        turned = [row.roll(-step, -1) for row, step in zip(logits[:, 0], steps, strict=True)]
+        turned += [row.roll(-step, -1) for row, step in zip(logits[:, 1], steps, strict=True)]
+        return torch.cat(turned).mean(0).log_softmax(0).numpy()
 
 
 def turn(yaw: Tensor) -> Tensor:
@@ -119,7 +119,7 @@ def load_yaw(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork, dict[st
     """
     path = find_weights(name, zoo)
     metadata, tensors = load_tensors(path)
-    if metadata.get("preset") != PRESET:
+    if metadata.get("preset") != YAW:
         raise ModelError(
             f"{path} holds a field of preset '{metadata.get('preset')}', not yaws; "
             "`nrdf yaw` trains what is needed here"

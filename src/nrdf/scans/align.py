@@ -1,7 +1,8 @@
 """Bringing a scan into its category's frame: yaw, scale and centre, and what else it might be.
 
-Yaws over the full circle are judged by the field (`nrdf.scans.judge`); the best are refined by the
-object's own mirror plane (`nrdf.scans.mirror`) and judged again, front and back exchanged too.
+Yaws over the full circle are judged by the field (`nrdf.scans.judge`) and by a network that tells
+which way an object faces (`nrdf.field.yaw`); the best are refined by the object's own mirror plane
+(`nrdf.scans.mirror`) and judged again, front and back exchanged too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nrdf.cloud import PointCloud, check_cloud
+from nrdf.field.yaw import at_yaws
 from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.scans.judge import Judge, sparse_subset
@@ -21,7 +23,8 @@ from nrdf.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis,
 WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that are judged by
 _YAWS = 36  # that are tried at first
-_REFINED = 4  # of them that are refined
+_REFINED = 4  # of them that are refined, by the field's judgement
+_FACING = 3  # likewise, by the network's
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
@@ -37,9 +40,10 @@ class Candidate:
     """One pose that may be the right one.
 
     pose: from canonical coordinates to the scan's. up: (3,) in the scan. yaw: (rad) about it.
-    cost: how badly the field explains the scan in this pose. symmetry: share of the points that
-    have a counterpart across the mirror plane, 0 where none was found. probability: of this pose
-    among the candidates, which add up to 1.
+    cost: how badly the field explains the scan in this pose (`field_cost`), and how little the
+    network of yaws thinks of it. symmetry: share of the points that have a counterpart across the
+    mirror plane, 0 where none was found. probability: of this pose among the candidates, which add
+    up to 1.
     """
 
     pose: Similarity
@@ -48,6 +52,7 @@ class Candidate:
     cost: float
     symmetry: float
     probability: float = 1.0
+    field_cost: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,7 +141,11 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
     chosen = sparse_subset(working.points, _COARSE_POINTS)
     costs = judge.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
-    refined = [found for index in _minima(costs) for found in _refine(working, tried[index])]
+    facing = _facing(judge, working, ups)
+    by_facing = -np.array([at_yaws(row, yaws) for row in facing])
+    best = np.concatenate([_minima(costs, _REFINED), _minima(by_facing, _FACING)])
+    lap("facing")
+    refined = [found for index in np.unique(best) for found in _refine(working, tried[index])]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
@@ -175,6 +184,16 @@ def _posed(
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
 
 
+def _facing(judge: Judge, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
+    """Log probabilities (ups, bins) of the yaws about each up; all alike without a network."""
+    if judge.yaw is None:
+        return np.zeros((len(ups), _YAWS))
+    order = np.random.default_rng(0).permutation(len(working.points))
+    points, normals = working.points[order], working.normals[order]
+    turns = [upright(up) for up in ups]
+    return np.array([judge.yaw.log_probability(points @ t, normals @ t) for t in turns])
+
+
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:
     """Hypotheses near one: both ways along the mirror plane, or a few yaws where there is none."""
     turn = upright(found.up)
@@ -198,11 +217,11 @@ def _completed(
     return points, normals
 
 
-def _minima(costs: np.ndarray) -> np.ndarray:
+def _minima(costs: np.ndarray, count: int) -> np.ndarray:
     """Flat indices of the lowest local minima of costs (ups, yaws) along the circle of yaws."""
     low = (costs <= np.roll(costs, 1, axis=1)) & (costs <= np.roll(costs, -1, axis=1))
     index = np.flatnonzero(low)
-    return index[np.argsort(costs.ravel()[index], kind="stable")][:_REFINED]
+    return index[np.argsort(costs.ravel()[index], kind="stable")][:count]
 
 
 def _angle(one: np.ndarray, two: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Training of the networks that tell yaw: simulated views of training shapes, whole ones among them.
+"""Training of the networks that tell yaw: on simulated views of training shapes.
 
 Which points of a shape a camera sees is worked out once for a ring of cameras, and kept as a bit a
 camera; a step draws cameras, a yaw, noise, and what else befalls a scan.
@@ -59,7 +59,7 @@ _SPREAD = 1.0  # of the yaws that count as right, in bins
 class YawSettings:
     """steps of `batch` clouds; rate: the highest of a cosine; noise, canonical, of points; seed."""
 
-    steps: int = 1500
+    steps: int = 1000
     batch: int = 48
     rate: float = 2e-3
     noise: float = 0.004
@@ -130,7 +130,8 @@ def split(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
     """Shapes to train on, and to validate with: every tenth of a source and those of the `val`
     split. The `test` split is in neither."""
     count: dict[str, int] = {}
-    kept, held = [], []
+    kept: list[Entry] = []
+    held: list[Entry] = []
     for entry in entries:
         if entry.split == "test":
             continue
