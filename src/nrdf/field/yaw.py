@@ -101,7 +101,7 @@ def turn(yaw: Tensor) -> Tensor:
     return torch.stack([torch.stack(row, -1) for row in rows], -2)
 
 
-def at_yaws(log_probability: np.ndarray, yaws: np.ndarray) -> np.ndarray:
+def at_yaws(log_probability: np.ndarray, yaws: np.ndarray | float) -> np.ndarray:
     """Values (...) of a distribution (bins,) over the circle at `yaws` (...) (rad), interpolated,
     relative to its highest."""
     bins = len(log_probability)

@@ -31,6 +31,7 @@ _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
 # Chosen on single views of family and test shapes: of the poses that are wrong, nine in ten are
 # reported as ambiguous, of those that are right two in ten.
 _COST_SCALE = 0.036  # difference of cost that makes a pose e times less likely
+_FACING_COST = 0.036  # of what the network finds e times less likely than what it likes best
 SURE = 0.8
 """Probability of a pose against any other one alone, below which both are likely."""
 
@@ -149,7 +150,8 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
-    costs = judge.fine(points, normals, *_completed(points, normals, refined))
+    by_field = judge.fine(points, normals, *_completed(points, normals, refined))
+    costs = by_field + _FACING_COST * _against(facing, ups, refined)
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
         found = refined[index]
@@ -157,7 +159,8 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
             pose = found.frame(working.points).then(working.to_scan)
             symmetry = found.plane.agreement if found.plane is not None else 0.0
             yaw = float(np.arctan2(np.sin(found.yaw), np.cos(found.yaw)))
-            candidates.append(Candidate(pose, found.up, yaw, float(costs[index]), symmetry))
+            cost, alone = float(costs[index]), float(by_field[index])
+            candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
     lap("fine")
     weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / _COST_SCALE)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
@@ -192,6 +195,13 @@ def _facing(judge: Judge, working: _Working, ups: list[np.ndarray]) -> np.ndarra
     points, normals = working.points[order], working.normals[order]
     turns = [upright(up) for up in ups]
     return np.array([judge.yaw.log_probability(points @ t, normals @ t) for t in turns])
+
+
+def _against(facing: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]) -> np.ndarray:
+    """What the network says against each hypothesis (h,): how much less likely, in logarithms."""
+    places = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
+    told = [at_yaws(facing[i], found.yaw) for i, found in zip(places, refined, strict=True)]
+    return -np.array(told)
 
 
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:
