@@ -24,7 +24,17 @@ Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
 message that says what to do; 3 where a limit that was set is not met, or with
 --strict where anything is doubtful; 130 after Ctrl-C."""
 
-RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "yaw", "eval bsrc", "ablate")
+RESUMABLE = (
+    "synth",
+    "prepare",
+    "boxes",
+    "correspond",
+    "train",
+    "yaw",
+    "eval bsrc",
+    "eval presence",
+    "ablate",
+)
 GROUPS = ("eval", "knowledge")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 
