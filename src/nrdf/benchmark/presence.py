@@ -18,11 +18,13 @@ from nrdf.benchmark.scans import KINDS, RegionFigure, score_regions
 from nrdf.errors import DataError, OutputError
 from nrdf.ply import write_atomically
 from nrdf.scans.judge import Judge
+from nrdf.shapes.families import get_family
 
 FIRST_SEED = 1_000_000
 """Of the members that are fitted on."""
 ABSENT_WEIGHT = 3.0
 """An absent region counts as much as so many that are there: there are few of them."""
+_CHOICE = 5
 _FOLDS = 5
 _RIDGE = 1e-2  # keeps the regression finite where the evidence separates all
 
@@ -46,7 +48,7 @@ def collect(
     folder: Path,
     progress: Callable[[int, int], None],
 ) -> list[RegionFigure]:
-    """Every region of `pairs` pairs of members, in every kind of scan.
+    """Every region of `pairs` pairs of members, in every kind of scan (`choose_pairs`).
 
     Each pair is kept in a file of `folder`, and not measured again. Raises OutputError if it cannot
     be written, DataError for a file that is damaged.
@@ -57,15 +59,32 @@ def collect(
         raise OutputError(f"cannot write to {folder}: {error.strerror or error}") from None
     figures: list[RegionFigure] = []
     ready: Judge | None = None
-    for pair in range(pairs):
+    for done, pair in enumerate(choose_pairs(category, pairs), 1):
         path = folder / f"{category}-{pair:03d}.json"
         if not path.is_file():
             ready = ready or judge()
             found = [vars(f) for f in score_regions(ready, category, pair, FIRST_SEED)]
             write_atomically(path, [json.dumps(found).encode()])
         figures += _read(path)
-        progress(pair + 1, pairs)
+        progress(done, pairs)
     return figures
+
+
+def choose_pairs(category: str, count: int) -> list[int]:
+    """Numbers of pairs to measure: of five times as many, those first whose target lacks most of
+    the regions that its reference has."""
+    family = get_family(category)
+    lacks = []
+    for pair in range(_CHOICE * count):
+        taught, target = (
+            {*family.region_of(surface.coordinates)}
+            for surface in (
+                family.member(FIRST_SEED + 2 * pair + i).sample_surface(1024, rng)
+                for i, rng in enumerate(map(np.random.default_rng, (0, 1)))
+            )
+        )
+        lacks.append(len(taught - target - {""}))
+    return sorted(np.argsort(-np.array(lacks), kind="stable")[:count].tolist())
 
 
 def fit(figures: Sequence[RegionFigure]) -> Rule:
