@@ -142,6 +142,28 @@ def test_a_car_is_no_chair():
     assert not bring_in(judge("car"), chair, up_axis("y")).fits
 
 
+class Facing:
+    """Says that everything is turned by one yaw (rad), this sure of it."""
+
+    def __init__(self, yaw: float, sure: float) -> None:
+        self.told = sure * np.cos(2 * np.pi / 36 * np.arange(36) - yaw)
+
+    def log_probability(self, points, normals):
+        assert points.shape == normals.shape and len(points) > 512
+        return self.told
+
+
+@pytest.mark.parametrize(("way", "sure", "turned"), [(2.2, 3, 0), (2.2 + np.pi, 60, 180)])
+def test_what_faces_the_other_way_is_told_by_field_and_network_together(way, sure, turned):
+    points = PLACE.to_scan(full("car", CHAIR).points)
+    asked = Judge(judge("car").model, yaw=Facing(way, sure))
+    found = align_scan(asked, PointCloud(points), UP)
+    assert yaw_error(found.best.pose, PLACE) == pytest.approx(turned, abs=2)
+    other = next(c for c in found.candidates if yaw_error(c.pose, found.best.pose) > 170)
+    assert other.probability < 0.3 and other.cost > other.field_cost
+    assert found.best.cost == pytest.approx(found.best.field_cost, abs=0.01)
+
+
 def test_likely_poses_are_those_that_no_other_one_beats_clearly():
     poses = [
         Candidate(pose(0.1 * i), UP, 0.1 * i, 0.0, 1.0, p) for i, p in enumerate((0.5, 0.4, 0.1))

@@ -24,7 +24,17 @@ Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
 message that says what to do; 3 where a limit that was set is not met, or with
 --strict where anything is doubtful; 130 after Ctrl-C."""
 
-RESUMABLE = ("synth", "prepare", "boxes", "correspond", "train", "eval bsrc", "ablate")
+RESUMABLE = (
+    "synth",
+    "prepare",
+    "boxes",
+    "correspond",
+    "train",
+    "yaw",
+    "eval bsrc",
+    "eval presence",
+    "ablate",
+)
 GROUPS = ("eval", "knowledge")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 
@@ -45,6 +55,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.studio import studio
     from nrdf.commands.train import train
     from nrdf.commands.transfer import transfer
+    from nrdf.commands.yaw import yaw
 
     return {
         "retrieve": retrieve,
@@ -62,6 +73,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "boxes": boxes,
         "correspond": correspond,
         "train": train,
+        "yaw": yaw,
         "zoo": zoo,
         "eval": evaluations,
         "ablate": ablate,

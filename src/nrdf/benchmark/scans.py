@@ -75,7 +75,8 @@ class PoseFigure:
 class RegionFigure:
     """One region on one target. kind: "canonical", or one of `KINDS`; state: "there", "absent" or
     "hidden" in truth; reason: what was reported; cd_l1: canonical, of what was found from what is
-    true and was seen, `MISSED` where nothing was found, NaN where there was nothing to find."""
+    true and was seen, `MISSED` where nothing was found, NaN where there was nothing to find;
+    evidence: of absence (`nrdf.regions.presence.evidence_of`)."""
 
     kind: str
     pair: int
@@ -84,6 +85,7 @@ class RegionFigure:
     reason: str
     found: int
     cd_l1: float
+    evidence: tuple[float, float]
 
 
 def members(category: str, count: int) -> Iterator[Item]:
@@ -164,12 +166,17 @@ def pose_error(found: AlignedScan, true: Similarity) -> tuple[float, float]:
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), abs(pose.scale / true.scale - 1)
 
 
-def score_regions(judge: Judge, category: str, pair: int) -> list[RegionFigure]:
-    """Every region of one member, found on another: canonical, and in scans of each kind."""
+def score_regions(
+    judge: Judge, category: str, pair: int, first_seed: int = FIRST_SEED
+) -> list[RegionFigure]:
+    """Every region of one member, found on another: canonical, and in scans of each kind.
+
+    The members of pair i have the seeds first_seed + 2 i and the next.
+    """
     family = get_family(category)
-    rng = np.random.default_rng([FIRST_SEED, pair])
-    reference = family.member(FIRST_SEED + 2 * pair)
-    target = family.member(FIRST_SEED + 2 * pair + 1)
+    rng = np.random.default_rng([first_seed, pair])
+    reference = family.member(first_seed + 2 * pair)
+    target = family.member(first_seed + 2 * pair + 1)
     taught_on = reference.sample_surface(CLOUD_POINTS, rng)
     surface = target.sample_surface(CLOUD_POINTS, rng)
     mesh = tessellate(target)
@@ -231,8 +238,12 @@ def _compare(
             found = points[match.indices]
             cd = chamfer_l1(found, true) if len(found) else MISSED
         if state:
-            reason = match.presence.reason
-            figures.append(RegionFigure(kind, pair, name, state, reason, len(match.indices), cd))
+            said = match.presence
+            figures.append(
+                RegionFigure(
+                    kind, pair, name, state, said.reason, len(match.indices), cd, said.evidence
+                )
+            )
     return figures
 
 

@@ -158,6 +158,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "scale": best.pose.scale,
         "probability": round(best.probability, 4),
         "cost": round(best.cost, 4),
+        "field_cost": round(best.field_cost, 4),
         "usual_cost": round(found.judge.usual_cost, 4),
         "strangeness": round(found.strangeness, 3),
         "fits": found.fits,
@@ -171,6 +172,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
                 "up": c.up,
                 "yaw_degrees": round(float(np.degrees(c.yaw)), 2),
                 "cost": round(c.cost, 4),
+                "field_cost": round(c.field_cost, 4),
                 "probability": round(c.probability, 4),
                 "symmetry": round(c.symmetry, 3),
             }

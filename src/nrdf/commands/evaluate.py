@@ -26,11 +26,13 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score: BSRC (bsrc), exact truth (families, carry, scans), shapes (shape), plans (toolpaths).
+    """Score: BSRC (bsrc), exact truth (families, carry, scans), shapes (shape), plans (toolpaths);
+    fit what tells absent regions (presence).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
     from nrdf.commands.evaluate_carry import carry
+    from nrdf.commands.evaluate_presence import presence
     from nrdf.commands.evaluate_scans import scans
     from nrdf.commands.evaluate_shape import shape
     from nrdf.commands.evaluate_toolpaths import toolpaths
@@ -40,6 +42,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
         "families": families,
         "carry": carry,
         "scans": scans,
+        "presence": presence,
         "toolpaths": toolpaths,
         "shape": shape,
     }

@@ -53,15 +53,18 @@ def gather() -> dict[str, Any]:
     """Versions, devices and models as plain values."""
     import torch
 
+    from nrdf.field.yaw import YAW_ZOO
     from nrdf.field.zoo import list_models
 
     devices = {"cpu": f"{torch.get_num_threads()} threads"}
     for i in range(torch.cuda.device_count()):
         memory = torch.cuda.get_device_properties(i).total_memory
         devices[f"cuda:{i}"] = f"{torch.cuda.get_device_name(i)}, {memory / 2**30:.0f} GiB"
+    entries = [(entry.name, entry) for entry in list_models()]
+    entries += [(f"{entry.name}, yaw", entry) for entry in list_models(YAW_ZOO)]
     models = [
         {
-            "name": entry.name,
+            "name": name,
             "category": entry.category,
             "preset": entry.preset,
             "bytes": entry.bytes,
@@ -76,7 +79,7 @@ def gather() -> dict[str, Any]:
             "date": entry.date,
             "note": entry.note,
         }
-        for entry in list_models()
+        for name, entry in entries
     ]
     return {"versions": versions(), "devices": devices, "models": models}
 
@@ -88,7 +91,7 @@ def zoo(
     scores: tuple[str, ...] = (),
     note: str = "",
 ) -> None:
-    """Add a trained field to the zoo of this checkout.
+    """Add a trained field, or what tells yaw, to the zoo of this checkout.
 
     Files over 8 MB are refused. The index gets the checksum, and from the file preset, training
     shapes with licences, commit and date.

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -21,8 +21,17 @@ from nrdf.ply import write_atomically
 FORMAT = "nrdf-weights-1"
 
 
-def save_weights(path: str | Path, field: Field, metadata: Mapping[str, Any]) -> None:
-    """Write a field's weights in float16, atomically (temporary file, then renamed).
+class Network(Protocol):
+    """What can be saved: named weights, the name of their kind, and the sizes to build it by."""
+
+    preset: ClassVar[str]
+    config: Any
+
+    def state_dict(self) -> Mapping[str, Tensor]: ...
+
+
+def save_weights(path: str | Path, field: Network, metadata: Mapping[str, Any]) -> None:
+    """Write a network's weights in float16, atomically (temporary file, then renamed).
 
     `metadata` needs a `category` and may hold anything that JSON can; preset and sizes are added.
     Raises OutputError when the file cannot be written.
@@ -50,7 +59,7 @@ def load_weights(
     one of another preset or category than asked for, and for tensors that do not fit the preset.
     """
     path = Path(path)
-    metadata, tensors = _read(path)
+    metadata, tensors = load_tensors(path)
     for kind, wanted in (("preset", preset), ("category", category)):
         if wanted is not None and metadata.get(kind) != wanted:
             raise ModelError(
@@ -72,10 +81,14 @@ def load_weights(
 
 def read_metadata(path: str | Path) -> dict[str, Any]:
     """What a weight file says of itself, checked against its checksum (errors: `load_weights`)."""
-    return _read(Path(path))[0]
+    return load_tensors(Path(path))[0]
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+def load_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """A weight file's metadata and tensors by name, whatever network they are of.
+
+    Raises ModelError for a file that is missing, truncated, altered or no weight file of ours.
+    """
     if not path.is_file():
         raise ModelError(f"no weight file {path}")
     try:

@@ -26,6 +26,8 @@ ZOO = Path(__file__).resolve().parents[1] / "zoo"
 INDEX = "index.json"
 LARGEST = 8_000_000
 """Bytes that a weight file in the zoo may have."""
+YAW = "yaw"
+"""Preset of what tells yaw (`nrdf.field.yaw`): no field, so it has a folder and an index below."""
 WEIGHTS = "weights.safetensors"
 """What a finished training run calls its weight file."""
 
@@ -111,6 +113,8 @@ def add_to_zoo(
 ) -> ZooEntry:
     """Copy a weight file into the zoo and enter it into the index, replacing one of that name.
 
+    What tells yaw goes into the zoo's folder `yaw`.
+
     `name` is the category unless given; `scores` are added to those in the file. Raises ModelError
     for a file that is damaged or larger than 8 MB, OutputError if the zoo cannot be written.
     """
@@ -122,6 +126,8 @@ def add_to_zoo(
             f"{path} has {size / 1e6:.1f} MB; the zoo takes at most {LARGEST / 1e6:.0f} MB: "
             "train a smaller field"
         )
+    if metadata["preset"] == YAW:
+        zoo = zoo / YAW
     name = name or str(metadata["category"])
     entry = ZooEntry(
         name=name,

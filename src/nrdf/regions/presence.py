@@ -13,10 +13,7 @@ import numpy as np
 
 ABSENT, NOT_OBSERVED = "absent", "not observed"
 
-# Logistic regression with the zoo's fields on the regions of 150 pairs of family members (seeds
-# from 1,000,000; chairs, aircraft, cars), whole and in simulated scans of three views and of one;
-# those that are absent weigh three times, which leaves every region of BSRC that exists clear of
-# being emptied. What the field expects as its error adds nothing to these two.
+# Fitted by `nrdf eval presence` (docs/scans.md); what the field expects as its error adds nothing.
 _BIAS, _EXISTENCE, _DISTANCE = 0.77, -1.88, 1.45
 _NEAREST = 0.2  # share of the mapped points whose distance counts
 _USUAL_DISTANCE = 0.05  # canonical, in position and weighted normal
@@ -29,12 +26,24 @@ class Presence:
     """What became of a region: reason "" where it was found, `ABSENT` or `NOT_OBSERVED` where not.
 
     confidence: in [0, 1], that this is so; observed: share of its mapped points that lie where the
-    scan has points.
+    scan has points. evidence: what absence was judged by (`evidence_of`).
     """
 
     reason: str
     confidence: float
     observed: float
+    evidence: tuple[float, float] = (0.0, 0.0)
+
+
+def evidence_of(existence: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
+    """What is known of a region's absence: the log odds that its places exist, and the logarithm of
+    how far even the nearest of its mapped points are off the target, in usual distances.
+
+    existence, distance: (m,) as for `find_presence`.
+    """
+    share = float(np.clip(existence.mean(), 1e-3, 1 - 1e-3))
+    off = max(float(np.quantile(distance, _NEAREST)), 1e-3) / _USUAL_DISTANCE
+    return float(np.log(share / (1 - share))), float(np.log(off))
 
 
 def find_presence(existence: np.ndarray, distance: np.ndarray) -> Presence:
@@ -43,13 +52,12 @@ def find_presence(existence: np.ndarray, distance: np.ndarray) -> Presence:
     existence: (m,) probabilities, 1 from a field that says nothing of the kind; distance: (m,) of
     the mapped points from the target's points, canonical, in position and weighted normal.
     """
-    share = float(np.clip(existence.mean(), 1e-3, 1 - 1e-3))
-    off = max(float(np.quantile(distance, _NEAREST)), 1e-3) / _USUAL_DISTANCE
-    score = _BIAS + _EXISTENCE * np.log(share / (1 - share)) + _DISTANCE * np.log(off)
+    evidence = evidence_of(existence, distance)
+    score = _BIAS + _EXISTENCE * evidence[0] + _DISTANCE * evidence[1]
     absent = float(1 / (1 + np.exp(-score)))
     observed = float((distance < _SEEN).mean())
     if absent > 0.5:
-        return Presence(ABSENT, absent, observed)
+        return Presence(ABSENT, absent, observed, evidence)
     if observed < _LEAST_SEEN:
-        return Presence(NOT_OBSERVED, (1 - absent) * (1 - observed), observed)
-    return Presence("", 1 - absent, observed)
+        return Presence(NOT_OBSERVED, (1 - absent) * (1 - observed), observed, evidence)
+    return Presence("", 1 - absent, observed, evidence)

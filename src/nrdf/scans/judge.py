@@ -18,6 +18,7 @@ from torch.nn import functional
 from nrdf.cloud import PointCloud
 from nrdf.errors import ModelError
 from nrdf.field.base import Inverse
+from nrdf.field.yaw import YawNetwork, find_yaw
 from nrdf.geometry import thin
 from nrdf.regions.association import NORMAL_WEIGHT
 from nrdf.regions.embedded import encoder_subset
@@ -42,12 +43,19 @@ _BATCH = 36
 class Judge:
     """Prototypes of a model's category, their descriptors known."""
 
-    def __init__(self, model: Model, prototypes: Sequence[PointCloud] = ()) -> None:
+    def __init__(
+        self,
+        model: Model,
+        prototypes: Sequence[PointCloud] = (),
+        yaw: YawNetwork | None = None,
+    ) -> None:
         """`prototypes` are canonical in orientation; members of the category's family unless given.
+        `yaw` tells which way its objects face; the category's in the zoo unless given.
 
         Raises ModelError if there are none and the category has no family.
         """
         self.model = model
+        self.yaw = yaw or find_yaw(model.category)
         given = list(prototypes) or family_prototypes(model.category)
         self.prototypes = len(given)
         self._clouds = [model.embed(cloud) for cloud in given]

@@ -71,7 +71,7 @@ class AlignedScan:
     @property
     def fits(self) -> bool:
         """Whether the object looks like one of the category at all."""
-        explained = self.alignment.best.cost < self.judge.usual_cost + _FOREIGN
+        explained = self.alignment.best.field_cost < self.judge.usual_cost + _FOREIGN
         return explained and self.strangeness < _STRANGEST
 
     @property
@@ -83,11 +83,11 @@ class AlignedScan:
                 f"{self.cleaned.others + 1} objects of comparable size are in view; the largest "
                 "was taken: crop the scan to take another"
             )
-        category = self.judge.model.category
+        category, usual = self.judge.model.category, self.judge.usual_cost
         if not self.fits:
             found.append(
                 f"the scan does not look like a {category}: the field explains it at a cost of "
-                f"{self.alignment.best.cost:.2f}, {self.judge.usual_cost:.2f} is usual, and its "
+                f"{self.alignment.best.field_cost:.2f}, {usual:.2f} is usual, and its "
                 f"proportions are {self.strangeness:.1f} standard deviations off"
             )
         if self.alignment.is_ambiguous:

@@ -1,0 +1,42 @@
+"""`nrdf yaw`: the network that tells which way a category's objects face."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+from nrdf.commands.console import console, progress_bar
+
+
+def yaw(
+    category: Positional[str],
+    data: tuple[Path, ...],
+    out: Path,
+    steps: int = 1000,
+    seed: int = 0,
+    overwrite: bool = False,
+) -> None:
+    """Train what tells which way scans of a category face; alignment uses it.
+
+    On simulated views of training shapes, on the CPU, in a few minutes. Killed at any moment, the
+    same command goes on. `nrdf zoo add` makes it the one that alignment uses for the category.
+
+    Example: nrdf yaw chair --data data/chair data/chair-family --out runs/chair-yaw
+
+    Args:
+        category: What the shapes are; all of them must be of it.
+        data: Data folders (of `nrdf prepare` or `nrdf synth`).
+        out: The run's folder.
+        steps: Steps of training, about 0.15 s each.
+        seed: Seed of the first weights and of everything drawn.
+        overwrite: Start anew in a folder that holds another run.
+    """
+    from nrdf.field.weights import read_metadata
+    from nrdf.training.yaw import YawSettings, train_yaw
+
+    with progress_bar("steps") as progress:
+        settings = YawSettings(steps=steps, seed=seed)
+        weights = train_yaw(category, list(data), out, settings, overwrite, progress)
+    wrong = read_metadata(weights)["scores"]["wrong-yaws"]
+    console.print(f"wrote {weights}; {100 * wrong:.1f} % of views of other shapes are told wrongly")
