@@ -154,7 +154,7 @@ def studio(tmp_path):
     server = open_server("127.0.0.1", 8480)
     made = Studio(Session(tmp_path / "session"), server, nrdf.load_model, ["chair"], {})
     yield made
-    made.worker.stop()
+    made.stop()
     server.stop()
 
 

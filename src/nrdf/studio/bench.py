@@ -131,6 +131,18 @@ class Bench:
             and _same_lesson(self._teacher[0], self.desk.document)
         )
 
+    def ready(self, key: str) -> Result:
+        """A target's result. Raises ProcessError where there is none of what is painted now."""
+        result = self.results.get(key)
+        if result is None:
+            raise ProcessError("nothing has been brought to a target yet: do so in step 4")
+        if not self.is_current(key):
+            raise ProcessError(
+                f"what is on {key} is of before your last change: press 'Bring the process there' "
+                "in step 4 first"
+            )
+        return result
+
     def transfer(self, document: Document, progress: Progress) -> None:
         """Bring the processes to every target whose result is not current.
 

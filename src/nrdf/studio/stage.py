@@ -9,6 +9,7 @@ import numpy as np
 import viser
 
 from nrdf.process.surface import unit
+from nrdf.similarity import about_up
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit
 
@@ -31,7 +32,7 @@ class Figure:
     def __init__(self, stage: Stage, key: str, number: int, body: Body) -> None:
         self.key, self.body, self.stage = key, body, stage
         self.path = f"/object{number}"
-        self.offset = np.zeros(3)
+        self.offset, self._rotation = np.zeros(3), np.eye(3)
         scene = stage.server.scene
         self.frame = scene.add_frame(self.path, show_axes=False)
         self.points = scene.add_point_cloud(
@@ -72,7 +73,7 @@ class Figure:
         low, high = self.body.low * self.stage.factor, self.body.high * self.stage.factor
         high[1] += _ABOVE
         choice = np.array(list(product((False, True), repeat=3)))
-        return np.where(choice, high, low) + self.offset
+        return np.where(choice, high, low) @ self._rotation.T + self.offset
 
     @property
     def top(self) -> np.ndarray:
@@ -80,10 +81,11 @@ class Figure:
         middle = (self.body.low + self.body.high) / 2
         return np.array([middle[0], self.body.high[1], middle[2]])
 
-    def stand(self, offset: np.ndarray) -> None:
-        """Move the object; offset (3,) in the scene."""
-        self.offset = offset
+    def stand(self, offset: np.ndarray, turn_rad: float = 0.0) -> None:
+        """Move the object, turned about its upright axis; offset (3,) in the scene."""
+        self.offset, self._rotation = offset, about_up(turn_rad)
         self.frame.position = tuple(offset)
+        self.frame.wxyz = (np.cos(turn_rad / 2), 0.0, np.sin(turn_rad / 2), 0.0)
 
     def paint(self, colours: np.ndarray) -> None:
         """Colours (k, 3) uint8 of the shown points, which are shaded here."""
@@ -139,16 +141,16 @@ class Figure:
         found = hit(
             self.body.points,
             self.body.normals,
-            (origin - self.offset) / self.stage.factor,
-            direction,
+            (origin - self.offset) @ self._rotation / self.stage.factor,
+            direction @ self._rotation,
             self.body.surface.spacing,
         )
         return None if found is None else (found[0], found[1] * self.stage.factor)
 
     def view(self, view: View) -> View:
         """A camera of the scene as the object sees it, m."""
-        position = (view.position - self.offset) / self.stage.factor
-        return View(position, view.rotation, view.fov_rad, view.aspect)
+        position = (view.position - self.offset) @ self._rotation / self.stage.factor
+        return View(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
 
     def remove(self) -> None:
         """Take the object and all that is drawn of it away."""
@@ -206,11 +208,13 @@ class Stage:
             figure.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
 
-    def camera(self, shown: Sequence[str], aspect: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where a camera with that width over height stands to see the objects `shown` from the
-        front, and what it looks at."""
+    def camera(
+        self, shown: Sequence[str], aspect: float, beside: Sequence[np.ndarray] = ()
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where a camera with that width over height stands to see the objects `shown`, and places
+        (k, 3) beside them, from the front, and what it looks at."""
         figures = [figure for key, figure in self.figures.items() if key in shown]
-        corners = np.array([corner for figure in figures for corner in figure.corners])
+        corners = np.concatenate([np.zeros((0, 3)), *(f.corners for f in figures), *beside])
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
