@@ -12,7 +12,7 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.bench import Bench
+from nrdf.studio.bench import Bench, Described
 from nrdf.studio.body import REFERENCE
 from nrdf.studio.colours import COLOURINGS, likeness_colours
 from nrdf.studio.desk import Desk
@@ -65,6 +65,8 @@ class Studio:
         self.beside: str | None = None
         """The one target that is shown beside the reference, None for all."""
         self._likeness: dict[str, np.ndarray] = {}
+        self._described: Described | None = None
+        self._pointed = 0
         self.mouse = Mouse(self)
         self.panel = Panel(self)
         working = self.panel.working
@@ -85,6 +87,7 @@ class Studio:
             self.stage.clear(1.0)
             self.bench.results.clear()
             self._likeness.clear()
+            self._described = None
             self.mouse.forget()
             self.region, self.step, self.beside = "", 0, None
             self.sync()
@@ -139,7 +142,7 @@ class Studio:
         shown = self.shown()
         self.stage.arrange(shown)
         self.trial.follow()
-        beside = self.trial.corners()
+        beside = self.trial.places
         place, middle = self.stage.camera(shown, _ASPECT, beside)
         initial = self.server.initial_camera
         initial.position, initial.look_at = tuple(place), tuple(middle)
@@ -209,20 +212,27 @@ class Studio:
                     lambda progress: self.bench.transfer(document, progress))  # fmt: skip
 
     def compare(self, key: str, index: int) -> None:
-        """Colour every object by how alike its points are to a shown point of the reference."""
+        """Colour every object by how alike its points are to a shown point of the reference: in
+        the background the first time, at once while the mouse goes on from there."""
         if key != REFERENCE:
-            raise NrdfError("click a point of the reference: what is like it lights up elsewhere")
+            raise NrdfError("point at the reference: what is like that place lights up elsewhere")
+        self._pointed = index
+        if self._described is not None and self.colouring == "likeness":
+            self._likeness = self._described.unlike(index)
+            for figure in self.stage.figures.values():
+                self.draw_colours(figure)
+            return
         document = self.desk.document
 
         def work(progress: Progress) -> None:
-            keys = [k for k in self.desk.objects() if k == REFERENCE or k in self.bench.results]
-            likeness = {}
-            for done, other in enumerate(keys):
-                progress(done, len(keys))
-                likeness[other] = self.bench.unlikeness(document, index, other)
-            self._likeness, self.colouring = likeness, "likeness"
+            described = self.bench.described(document, progress)
+            with self.lock:
+                self._described = described
+                self._likeness, self.colouring = described.unlike(self._pointed), "likeness"
 
-        self._later("likeness", "comparing descriptors", 0.0, work)
+        if self._described is not None or not self.worker.does("likeness"):
+            self._described = None
+            self._later("likeness", "comparing descriptors", 0.0, work)
 
     def _later(
         self, kind: str, what: str, delay_s: float, work: Callable[[Progress], None]

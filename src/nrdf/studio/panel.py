@@ -30,7 +30,8 @@ _HINTS = {
     "Brush": "drag over the surface; drag beside the object to turn.",
     "Box": "drag a rectangle over what you mean; take Turn to turn again.",
     "Arrow": "drag on the reference, along the lines that the tool shall drive.",
-    "Alike": "click a point of the reference: places that are like it light up.",
+    "Alike": "move over the reference with the button held (or click): places that are like the "
+    "one under the cursor light up. How far that reaches: a slider in step 4.",
 }
 
 
@@ -61,9 +62,13 @@ class Activity:
 
     def started(self, what: str) -> None:
         """Work begins."""
-        self._what.content = f"*{what} …*"
+        self.says(what)
         self._bar.value = 0.0
         self._since = time.monotonic()
+
+    def says(self, what: str) -> None:
+        """What is being done now."""
+        self._what.content = f"*{what} …*"
 
     def progress(self, done: int, total: int) -> None:
         """So much of it is done; shown once it takes long, so that the panel does not jump."""

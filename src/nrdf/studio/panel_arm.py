@@ -147,10 +147,11 @@ def verdicts(report: Mapping[str, Any]) -> str:
             missed.append(f"⚠ **{path['region']}**, not reached: {listed}.")
         if path["collisions"]:
             worst = max(path["collisions"], key=lambda c: c["depth_m"])
+            count = len(path["collisions"])
+            moves = "1 move touches" if count == 1 else f"{count} moves touch"
             missed.append(
-                f"⚠ **{path['region']}**: {len(path['collisions'])} moves touch something, "
-                f"{_TOUCHED[worst['what']]} by up to {1e3 * worst['depth_m']:.1f} mm: do not run "
-                "it so."
+                f"⚠ **{path['region']}**: {moves} something, {_TOUCHED[worst['what']]} by up to "
+                f"{1e3 * worst['depth_m']:.1f} mm: do not run it so."
             )
     if kinds:
         means = "; ".join(f"*{kind}*: {_MEANS[kind]}" for kind in kinds)

@@ -14,7 +14,8 @@ _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the cell's frame, z up, to the stage's directions, y up, the object's x staying x."""
 _MISSED = (215, 20, 20)
 _MISSED_SIZE = 2.6  # of a point that is not reached, in spacings
-_ROOM_M = 0.12  # around the arm's frames, for its thickness
+_ROOM_M = (-0.08, 0.08)  # around the arm's frames, for its thickness
+_EVERY = 25  # moments between those that a camera is placed by
 
 
 class Rig:
@@ -53,12 +54,14 @@ class Rig:
         self.stand(figure.offset)
 
     @property
-    def corners(self) -> np.ndarray:
-        """The corners (8, 3), in the scene, of the box that the arm is in at all times."""
-        flat = self.playback.positions.reshape(-1, 3)
-        ends = np.stack([flat.min(axis=0) - _ROOM_M, flat.max(axis=0) + _ROOM_M])
-        choice = np.array(np.meshgrid(*ends.T, indexing="ij")).reshape(3, -1).T
-        return choice @ _CELL.T * self._factor + self._origin
+    def places(self) -> np.ndarray:
+        """Places (k, 3) in the scene that the arm takes up at work, its base's foot included."""
+        playback = self.playback
+        at_work = playback.positions[playback.doing == "process"][::_EVERY].reshape(-1, 3)
+        around = np.array([[x, y, z] for x in _ROOM_M for y in _ROOM_M for z in _ROOM_M])
+        foot = playback.positions[0, 0] * [1.0, 1.0, 0.0]
+        taken = np.concatenate([(at_work[:, None] + around).reshape(-1, 3), [foot]])
+        return taken @ _CELL.T * self._factor + self._origin
 
     def stand(self, offset: np.ndarray) -> None:
         """Stand where the object, not turned, is at `offset` (3,) in the scene."""

@@ -10,7 +10,7 @@ import logging
 import signal
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -27,7 +27,6 @@ log = logging.getLogger(__name__)
 
 _LOOKS_EVERY_S = 0.2  # whether the person has cancelled
 _PATIENCE_S = 5.0  # for a process that has been told to end
-_PHASES = 4  # of each tool path, after two of the whole
 
 
 def need_engine() -> None:
@@ -51,10 +50,10 @@ class Simulator:
         self._process.start()
         other.close()
 
-    def drive(self, progress: Progress) -> Playback:
-        """Wait for the simulation. Raises RobotError and ProcessError as `nrdf simulate` does, and
-        what `progress` raises."""
-        made: Playback = self._wait(progress)
+    def drive(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
+        """Wait for the simulation; `say` is told what is being done. Raises RobotError and
+        ProcessError as `nrdf simulate` does, and what `progress` raises."""
+        made: Playback = self._wait(progress, say)
         return made
 
     def write(
@@ -87,7 +86,7 @@ class Simulator:
         except OSError:
             raise self._gone() from None
 
-    def _wait(self, progress: Progress) -> Any:
+    def _wait(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Any:
         """What the process answers."""
         share = (0, 1)
         while True:
@@ -100,6 +99,8 @@ class Simulator:
                 raise self._gone() from None
             if kind == "progress":
                 share = value
+            elif kind == "phase":
+                say(value)
             elif kind == "made":
                 return value
             elif kind == "cancelled":
@@ -140,12 +141,14 @@ def _simulate_and_write(
     from nrdf.robot.simulate import read_work, simulate
     from nrdf.studio.playback import playback_of
 
-    work, done = read_work(job), 0
+    work = read_work(job)
+    seen: list[str] = []
 
-    def phase(_: str) -> None:
-        nonlocal done
-        pipe.send(("progress", (done, 2 + _PHASES * len(work.job.paths))))
-        done += 1
+    def phase(what: str) -> None:
+        # The phases of one tool path begin alike.
+        seen.append(what.partition(":")[0])
+        pipe.send(("phase", what))
+        pipe.send(("progress", (len(set(seen)) - 1, 2 + len(work.job.paths))))
 
     simulated = simulate(work, load_arm(robot, tool_frame), progress=phase)
     pipe.send(("made", playback_of(simulated)))

@@ -16,6 +16,8 @@ from nrdf.studio.view import View, hit
 FOV_RAD = np.radians(48.0)
 _FROM = np.array([0.86, 0.52, 0.34])
 """Where the camera stands, seen from the objects: before them, above, to their right."""
+_FROM_BESIDE = np.array([0.42, 0.36, 0.83])
+"""The same where an arm stands before the object."""
 _ROOM = 1.06  # times the distance at which all is just seen
 _ABOVE = 0.14  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
@@ -209,16 +211,17 @@ class Stage:
             right -= high[2] - low[2] + gap
 
     def camera(
-        self, shown: Sequence[str], aspect: float, beside: Sequence[np.ndarray] = ()
+        self, shown: Sequence[str], aspect: float, beside: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Where a camera with that width over height stands to see the objects `shown`, and places
-        (k, 3) beside them, from the front, and what it looks at."""
+        """Where a camera with that width over height stands to see the objects `shown` from the
+        front, or with places (k, 3) beside them from their right, and what it looks at."""
         figures = [figure for key, figure in self.figures.items() if key in shown]
-        corners = np.concatenate([np.zeros((0, 3)), *(f.corners for f in figures), *beside])
+        more = np.zeros((0, 3)) if beside is None else beside
+        corners = np.concatenate([more, *(figure.corners for figure in figures)])
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        toward = unit(_FROM)
+        toward = unit(_FROM if beside is None else _FROM_BESIDE)
         right = unit(np.cross([0.0, 1.0, 0.0], toward))
         axes = np.stack([right, np.cross(toward, right), toward])
         seen = (corners - middle) @ axes.T

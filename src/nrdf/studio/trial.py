@@ -14,6 +14,7 @@ from nrdf.studio.simulator import Simulator, need_engine
 from nrdf.studio.worker import Progress, Worker
 
 if TYPE_CHECKING:
+    import numpy as np
     import viser
 
     from nrdf.studio.app import Studio
@@ -60,19 +61,23 @@ class Trial:
         """
         result = self.studio.bench.ready(key)
         need_engine()
+        what = f"simulating the arm on {key}"
+
+        def say(phase: str) -> None:
+            self.studio.panel.driving.says(f"{what}: {phase}")
 
         def work(progress: Progress) -> None:
             progress(0, 1)
             job = save_job(self.studio.desk, key, result, self.studio.origin)
             simulator = Simulator(job, self._robot, self._tool_frame)
             try:
-                playback = simulator.drive(progress)
+                playback = simulator.drive(progress, say)
                 self._put(key, result, job, playback, simulator)
             except BaseException:
                 simulator.end()
                 raise
 
-        self.worker.submit("simulate", f"simulating the arm on {key}", work)
+        self.worker.submit("simulate", what, work)
 
     def save(self, client: viser.ClientHandle) -> None:
         """Write the simulation as `nrdf simulate` does, in the background, and send it.
@@ -187,6 +192,7 @@ class Trial:
             self.studio.panel.arm.played()
             return more
 
-    def corners(self) -> list:
-        """What of the arm a camera has to see."""
-        return [] if self._rig is None or not self.shown else [self._rig.corners]
+    @property
+    def places(self) -> np.ndarray | None:
+        """Places (k, 3) in the scene that a camera has to see, if an arm is shown."""
+        return None if self._rig is None or not self.shown else self._rig.places
