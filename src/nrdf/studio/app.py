@@ -183,6 +183,10 @@ class Studio:
             self.colouring, self.width = colouring, width
             self.draw()
 
+    def likeness(self, key: str) -> np.ndarray | None:
+        """How far an object's shown points (k,) are from the place that was pointed at, if any."""
+        return self._likeness.get(key)
+
     def _alike(self, figure: Figure) -> bool:
         return self.colouring == "likeness" and figure.key in self._likeness
 
