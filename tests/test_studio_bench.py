@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nrdf
-from nrdf.errors import NrdfError, ProcessError, RegionError
+from nrdf.errors import ProcessError, RegionError
 from nrdf.process.lesson import read_lesson
 from nrdf.process.toolpath import read_job
 from nrdf.studio.bench import Bench
@@ -128,13 +128,16 @@ def test_an_incomplete_document_is_refused(bench):
 
 def test_likeness_is_greatest_around_the_point_itself(bench):
     document = bench.desk.document
-    away = bench.unlikeness(document, 17, REFERENCE)
+    described = bench.described(document, silent)
+    away = described.unlike(17)[REFERENCE]
     # An untrained C finds each of a shape's points on the same shape again.
     assert away.argmin() == 17 and away[17] == pytest.approx(0, abs=1e-5)
-    with pytest.raises(NrdfError, match="step 4"):
-        bench.unlikeness(document, 17, "new")
+    assert described.unlike(18)[REFERENCE].argmin() == 18, "for another point at once"
+    assert list(described.objects) == [REFERENCE]
     bench.transfer(document, silent)
-    assert bench.unlikeness(document, 17, "new").shape == (len(bench.desk.body("new").points),)
+    found = bench.described(document, silent)
+    assert found.unlike(17)["new"].shape == (len(bench.desk.body("new").points),)
+    assert found.objects[REFERENCE][1] is described.objects[REFERENCE][1], "computed once"
 
 
 def test_what_is_drawn(bench):

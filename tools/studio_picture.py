@@ -49,7 +49,7 @@ def main() -> None:
         time.sleep(5)
         page.screenshot(path=PICTURE)
         browser.close()
-        studio.worker.stop()
+        studio.stop()
     server.stop()
 
 

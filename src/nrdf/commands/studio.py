@@ -13,6 +13,8 @@ def studio(
     port: int = 8080,
     no_browser: bool = False,
     device: str = "cpu",
+    robot: Path | None = None,
+    tool_frame: str | None = None,
 ) -> None:
     """Paint regions, describe processes and see them on other objects, in a browser.
 
@@ -28,6 +30,8 @@ def studio(
         port: Port to listen on; the next free one where it is taken.
         no_browser: Do not open a browser.
         device: cpu, cuda, cuda:N or auto.
+        robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
+        tool_frame: Body or site of the robot that the tool is mounted on.
     """
     from nrdf.errors import OutputError
 
@@ -47,7 +51,10 @@ def studio(
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     categories = [entry.category for entry in list_models()]
-    app = Studio(kept, server, lambda name: nrdf.load_model(name, device), categories, origin)
+    app = Studio(
+        kept, server, lambda name: nrdf.load_model(name, device), categories, origin, robot,
+        tool_frame,
+    )  # fmt: skip
     if host not in LOOPBACK:
         errors.print(
             f"listening on {host}: everyone who can reach this computer there can see and change "
@@ -64,5 +71,5 @@ def studio(
     try:
         server.sleep_forever()
     finally:
-        app.worker.stop()
+        app.stop()
         server.stop()

@@ -219,20 +219,26 @@ class Taught:
         normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
 
-    def unlikeness(self, index: int, target: Embedded) -> np.ndarray:
-        """How far what each point of a target (n,) describes is from a point of the reference.
+    def described(self, target: Embedded) -> np.ndarray:
+        """What the descriptors of a target's, or the reference's, working points (n, 6) say, to be
+        compared by `unlike`.
 
-        index: of the point in the reference's cloud; n: the target's working points, or the
-        reference's own. Descriptors of two shapes are compared by the places on the reference that
-        C finds for them, C(z_reference, θ(z_target, x)): canonical distances, in position and
-        weighted normal. Raises ModelError for a field without C.
+        Descriptors of two shapes are compared by the places on the reference that C finds for
+        them, C(z_reference, θ(z_target, x)), with their weighted normals. Raises ModelError for a
+        field without C.
         """
-        own = int(self.reference.nearest_working[index])
         k = self._describe(target.points, target.normals, target.z)
         landed = self._invert(self.reference, k, target.normals)
-        there = oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
-        here = oriented_features(self.reference.points, self.reference.normals, NORMAL_WEIGHT)
-        return np.asarray(np.linalg.norm(there - here[own], axis=1))
+        return oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
+
+    def unlike(self, index: int, described: np.ndarray) -> np.ndarray:
+        """How far (n,), in canonical position and weighted normal, what is `described` (n, 6) is
+        from a point of the reference's cloud."""
+        own = int(self.reference.nearest_working[index])
+        here = oriented_features(
+            self.reference.points[[own]], self.reference.normals[[own]], NORMAL_WEIGHT
+        )
+        return np.asarray(np.linalg.norm(described - here, axis=1))
 
     def facing(self, regions: Mapping[str, np.ndarray], target: Embedded) -> Embedded:
         """The target with its sheets turned to the side that the regions are on.

@@ -12,19 +12,21 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.bench import Bench
+from nrdf.studio.bench import Bench, Described
 from nrdf.studio.body import REFERENCE
 from nrdf.studio.colours import COLOURINGS, likeness_colours
 from nrdf.studio.desk import Desk
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
 from nrdf.studio.mouse import Mouse
-from nrdf.studio.panel import Panel
+from nrdf.studio.panel import Activity, Panel
 from nrdf.studio.session import Session
 from nrdf.studio.stage import Figure, Stage
+from nrdf.studio.trial import Trial
 from nrdf.studio.worker import Progress, Worker
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from nrdf.regions.model import Model
 
@@ -39,7 +41,8 @@ class Studio:
     """Everything between browsers and a session; all that are connected see the same.
 
     server: a viser server with nothing on it yet. load: gives the model of a category, one of
-    `categories`. origin: what reports say of how they were made.
+    `categories`. origin: what reports say of how they were made. robot, tool_frame: the arm of
+    simulations, the bundled one unless given.
     """
 
     def __init__(
@@ -49,6 +52,8 @@ class Studio:
         load: Callable[[str], Model],
         categories: Sequence[str],
         origin: Mapping[str, Any],
+        robot: Path | None = None,
+        tool_frame: str | None = None,
     ) -> None:
         self.server, self.categories, self.origin = server, tuple(categories), origin
         self.desk = Desk(session)
@@ -60,9 +65,13 @@ class Studio:
         self.beside: str | None = None
         """The one target that is shown beside the reference, None for all."""
         self._likeness: dict[str, np.ndarray] = {}
+        self._described: Described | None = None
+        self._pointed = 0
         self.mouse = Mouse(self)
         self.panel = Panel(self)
-        self.worker = Worker(self.panel.started, self.panel.progress, self._ended)
+        working = self.panel.working
+        self.worker = Worker(working.started, working.progress, self.ended(working))
+        self.trial = Trial(self, robot, tool_frame)
         server.on_client_connect(self._welcome)
         self.restore()
 
@@ -73,9 +82,12 @@ class Studio:
         with self.lock:
             document = self.desk.document
             self.worker.cancel()
+            self.trial.worker.cancel()
+            self.trial.clear()
             self.stage.clear(1.0)
             self.bench.results.clear()
             self._likeness.clear()
+            self._described = None
             self.mouse.forget()
             self.region, self.step, self.beside = "", 0, None
             self.sync()
@@ -111,6 +123,7 @@ class Studio:
                 painted = document.regions[-1] if document.regions else None
                 self.region, self.step = ("" if painted is None else painted.name), 0
             self.step = min(self.step, len(painted.steps) - 1) if painted else 0
+            self.trial.check()
             if gone or new:
                 self.arrange()
             self.mouse.grip()
@@ -118,7 +131,9 @@ class Studio:
             self.panel.refresh()
 
     def shown(self) -> list[str]:
-        """The objects that are to be seen."""
+        """The objects that are to be seen: with an arm, the one that it works on."""
+        if self.trial.shown:
+            return [self.trial.key]
         keys = self.desk.objects()
         return [k for k in keys if k == REFERENCE or self.beside is None or k == self.beside]
 
@@ -126,11 +141,13 @@ class Studio:
         """Let what is to be seen stand side by side, and every camera see all of it."""
         shown = self.shown()
         self.stage.arrange(shown)
-        place, middle = self.stage.camera(shown, _ASPECT)
+        self.trial.follow()
+        beside = self.trial.places
+        place, middle = self.stage.camera(shown, _ASPECT, beside)
         initial = self.server.initial_camera
         initial.position, initial.look_at = tuple(place), tuple(middle)
         for client in self.server.get_clients().values():
-            place, middle = self.stage.camera(shown, client.camera.aspect)
+            place, middle = self.stage.camera(shown, client.camera.aspect, beside)
             with client.atomic():
                 client.camera.position = place
                 client.camera.look_at = middle
@@ -166,6 +183,10 @@ class Studio:
             self.colouring, self.width = colouring, width
             self.draw()
 
+    def likeness(self, key: str) -> np.ndarray | None:
+        """How far an object's shown points (k,) are from the place that was pointed at, if any."""
+        return self._likeness.get(key)
+
     def _alike(self, figure: Figure) -> bool:
         return self.colouring == "likeness" and figure.key in self._likeness
 
@@ -195,20 +216,27 @@ class Studio:
                     lambda progress: self.bench.transfer(document, progress))  # fmt: skip
 
     def compare(self, key: str, index: int) -> None:
-        """Colour every object by how alike its points are to a shown point of the reference."""
+        """Colour every object by how alike its points are to a shown point of the reference: in
+        the background the first time, at once while the mouse goes on from there."""
         if key != REFERENCE:
-            raise NrdfError("click a point of the reference: what is like it lights up elsewhere")
+            raise NrdfError("point at the reference: what is like that place lights up elsewhere")
+        self._pointed = index
+        if self._described is not None and self.colouring == "likeness":
+            self._likeness = self._described.unlike(index)
+            for figure in self.stage.figures.values():
+                self.draw_colours(figure)
+            return
         document = self.desk.document
 
         def work(progress: Progress) -> None:
-            keys = [k for k in self.desk.objects() if k == REFERENCE or k in self.bench.results]
-            likeness = {}
-            for done, other in enumerate(keys):
-                progress(done, len(keys))
-                likeness[other] = self.bench.unlikeness(document, index, other)
-            self._likeness, self.colouring = likeness, "likeness"
+            described = self.bench.described(document, progress)
+            with self.lock:
+                self._described = described
+                self._likeness, self.colouring = described.unlike(self._pointed), "likeness"
 
-        self._later("likeness", "comparing descriptors", 0.0, work)
+        if self._described is not None or not self.worker.does("likeness"):
+            self._described = None
+            self._later("likeness", "comparing descriptors", 0.0, work)
 
     def _later(
         self, kind: str, what: str, delay_s: float, work: Callable[[Progress], None]
@@ -225,12 +253,22 @@ class Studio:
 
         self.worker.submit(kind, what, then_show, delay_s)
 
-    def _ended(self, what: str, error: str) -> None:
-        self.panel.ended()
-        if error == "cancelled":
-            self.tell(what, "cancelled; what was finished is kept", bad=False)
-        elif error:
-            self.tell(what, error)
+    def ended(self, activity: Activity) -> Callable[[str, str], None]:
+        """What a worker calls when a job has ended: (what it was, error or "")."""
+
+        def end(what: str, error: str) -> None:
+            activity.ended()
+            if error == "cancelled":
+                self.tell(what, "cancelled; what was finished is kept", bad=False)
+            elif error:
+                self.tell(what, error)
+
+        return end
+
+    def stop(self) -> None:
+        """End all that runs beside the page."""
+        self.worker.stop()
+        self.trial.stop()
 
     # --- talking
 

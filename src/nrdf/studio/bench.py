@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from nrdf.studio.teaching import lesson_of, process_of
 from nrdf.studio.worker import Progress
 
 if TYPE_CHECKING:
-    from nrdf.regions.model import Model
+    from nrdf.regions.model import Model, Taught
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,17 @@ class Result:
         return [r.name for r in regions if r.missing or r.match.score < DOUBTFUL]
 
 
+@dataclass(frozen=True)
+class Described:
+    """What the descriptors of several objects say, by `nrdf.regions.model.Taught.described`."""
+
+    objects: Mapping[str, tuple[Taught, np.ndarray]]
+
+    def unlike(self, index: int) -> dict[str, np.ndarray]:
+        """How far each object's shown points (k,) are from a shown point of the reference."""
+        return {key: taught.unlike(index, said) for key, (taught, said) in self.objects.items()}
+
+
 class Bench:
     """Plans and transfers of a desk's document, each kept as long as it holds.
 
@@ -74,6 +85,7 @@ class Bench:
         self._models: dict[str, Model] = {}
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
         self._teacher: tuple[Document, Teacher] | None = None
+        self._described: dict[str, tuple[Taught, Embedded, np.ndarray]] = {}
 
     def model(self, category: str) -> Model:
         """The category's model, loaded once."""
@@ -131,6 +143,18 @@ class Bench:
             and _same_lesson(self._teacher[0], self.desk.document)
         )
 
+    def ready(self, key: str) -> Result:
+        """A target's result. Raises ProcessError where there is none of what is painted now."""
+        result = self.results.get(key)
+        if result is None:
+            raise ProcessError("nothing has been brought to a target yet: do so in step 4")
+        if not self.is_current(key):
+            raise ProcessError(
+                f"what is on {key} is of before your last change: press 'Bring the process there' "
+                "in step 4 first"
+            )
+        return result
+
     def transfer(self, document: Document, progress: Progress) -> None:
         """Bring the processes to every target whose result is not current.
 
@@ -168,19 +192,21 @@ class Bench:
 
     # --- likeness
 
-    def unlikeness(self, document: Document, index: int, key: str) -> np.ndarray:
-        """How far what an object's shown points (k,) describe is from a shown point of the
-        reference (`Taught.unlikeness`).
-
-        Raises NrdfError for a target to which nothing has been brought yet.
-        """
-        if key == REFERENCE:
-            teacher = self._taught(document)
-            return teacher.taught.unlikeness(index, teacher.taught.reference)
-        result = self.results.get(key)
-        if result is None:
-            raise NrdfError(f"nothing has been brought to {key} yet: do so in step 4")
-        return result.teacher.taught.unlikeness(index, result.embedded)
+    def described(self, document: Document, progress: Progress) -> Described:
+        """What the descriptors of the reference and of every target with a result say, computed
+        where it has changed."""
+        teacher = self._taught(document)
+        of: dict[str, tuple[Taught, Embedded]] = {
+            REFERENCE: (teacher.taught, teacher.taught.reference)
+        }
+        of |= {key: (r.teacher.taught, r.embedded) for key, r in self.results.items()}
+        kept = self._described
+        for done, (key, (taught, embedded)) in enumerate(of.items()):
+            progress(done, len(of))
+            earlier = kept.get(key)
+            if earlier is None or earlier[0] is not taught or earlier[1] is not embedded:
+                kept[key] = (taught, embedded, taught.described(embedded))
+        return Described({key: (kept[key][0], kept[key][2]) for key in of})
 
 
 def _basis(document: Document, region: Painted, number: int) -> bytes:

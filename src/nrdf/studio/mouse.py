@@ -58,7 +58,7 @@ class Mouse:
         scene.remove_rect_select_callback()
         if self.tool == "Box":
             scene.on_rect_select()(self._boxed)
-        drags = self.tool in ("Brush", "Arrow")
+        drags = self.tool in ("Brush", "Arrow", "Alike")
         for figure in self.studio.stage.figures.values():
             figure.ground.remove_drag_callback()
             figure.ground.visible = drags
@@ -118,13 +118,16 @@ class Mouse:
             if event.phase == "start":
                 self.forget()
                 self._drag = stage.hit(view.position, view.ray(event.start_screen_pos))
-                if self._drag is not None:
+                if self._drag is not None and self.tool != "Alike":
                     self._check(self._drag[0])
             if self._drag is None:
                 return
             figure, first = self._drag
             index = met[1] if met is not None and met[0] is figure else None
-            if self.tool == "Brush":
+            if self.tool == "Alike":
+                if index is not None:
+                    self.studio.compare(figure.key, index)
+            elif self.tool == "Brush":
                 start = event.phase == "start"
                 at = [i for i in (first if start else None, index) if i is not None]
                 if at:
@@ -135,7 +138,8 @@ class Mouse:
                 self._point(figure, first, index, event.phase == "end")
             if event.phase == "end":
                 self._drag = None
-                self.studio.painted()
+                if self.tool != "Alike":
+                    self.studio.painted()
 
     def _point(self, figure: Figure, first: int, last: int, final: bool) -> None:
         start, stop = figure.body.points[first], figure.body.points[last]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import viser
 
 from nrdf.studio.mouse import TOOLS
+from nrdf.studio.panel_arm import ArmTab
 from nrdf.studio.panel_object import ObjectTab
 from nrdf.studio.panel_paint import PaintTab
 from nrdf.studio.panel_process import ProcessTab
@@ -29,7 +30,8 @@ _HINTS = {
     "Brush": "drag over the surface; drag beside the object to turn.",
     "Box": "drag a rectangle over what you mean; take Turn to turn again.",
     "Arrow": "drag on the reference, along the lines that the tool shall drive.",
-    "Alike": "click a point of the reference: places that are like it light up.",
+    "Alike": "move over the reference with the button held (or click): places that are like the "
+    "one under the cursor light up. How far that reaches: a slider in step 4.",
 }
 
 
@@ -42,10 +44,48 @@ class Said:
 
 
 class Tab(Protocol):
-    """One of the five steps."""
+    """One of the steps."""
 
     def refresh(self) -> None:
         """Show what the document says."""
+
+
+class Activity:
+    """Long work that goes on: what it is, how far it is, and a button that ends it."""
+
+    def __init__(self, gui: viser.GuiApi, cancel: Callable[[], None]) -> None:
+        self._what = gui.add_markdown("", visible=False)
+        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._cancel = gui.add_button("Cancel", color="gray", visible=False)
+        self._cancel.on_click(lambda _: cancel())
+        self._since = 0.0
+
+    def started(self, what: str) -> None:
+        """Work begins."""
+        self.says(what)
+        self._bar.value = 0.0
+        self._since = time.monotonic()
+
+    def says(self, what: str) -> None:
+        """What is being done now."""
+        self._what.content = f"*{what} …*"
+
+    def progress(self, done: int, total: int) -> None:
+        """So much of it is done; shown once it takes long, so that the panel does not jump."""
+        if time.monotonic() - self._since > _LONG_S:
+            self._show(True)
+        share = min(100.0, 100.0 * done / max(total, 1))
+        if self._bar.value != share:
+            self._bar.value = share
+
+    def ended(self) -> None:
+        """Nothing is going on any more."""
+        self._show(False)
+
+    def _show(self, visible: bool) -> None:
+        for handle in (self._what, self._bar, self._cancel):
+            if handle.visible != visible:
+                handle.visible = visible
 
 
 class Panel:
@@ -55,7 +95,6 @@ class Panel:
         self.studio, gui = studio, studio.server.gui
         self._acts = ThreadPoolExecutor(1, "studio panel")
         self._unheard: Counter[int] = Counter()
-        self._since = 0.0
         gui.configure_theme(
             show_logo=False, show_share_button=False, brand_color=(0, 114, 178),
             control_width="large",
@@ -63,10 +102,8 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(440)
         self.next = gui.add_markdown("")
-        self.doing = gui.add_markdown("", visible=False)
-        self.bar = gui.add_progress_bar(0.0, visible=False, animated=True)
-        self.cancel = gui.add_button("Cancel", color="gray", visible=False)
-        self.cancel.on_click(lambda _: studio.worker.cancel())
+        self.working = Activity(gui, lambda: studio.worker.cancel())
+        self.driving = Activity(gui, lambda: studio.trial.worker.cancel())
         self.tool = gui.add_button_group("Mouse", TOOLS)
         self.hint = gui.add_markdown("")
         self.region = gui.add_dropdown(
@@ -83,8 +120,10 @@ class Panel:
             self.targets = TargetsTab(self)
         with group.add_tab("5 Save"):
             self.save = SaveTab(self)
+        with group.add_tab("6 Robot"):
+            self.arm = ArmTab(self)
         self._tabs: tuple[Tab, ...] = (
-            self.object, self.paint, self.process, self.targets, self.save,
+            self.object, self.paint, self.process, self.targets, self.save, self.arm,
         )  # fmt: skip
         self.on(self.tool.on_click, lambda said: self._take(said.value))
         self.on(self.region.on_update, lambda said: self._choose(said.value))
@@ -137,22 +176,6 @@ class Panel:
             for tab in self._tabs:
                 tab.refresh()
 
-    def started(self, what: str) -> None:
-        """Long work begins."""
-        self.doing.content = f"*{what} …*"
-        self.put(self.bar, 0.0)
-        self._since = time.monotonic()
-
-    def progress(self, done: int, total: int) -> None:
-        """So much of it is done; shown once it takes long, so that the panel does not jump."""
-        if time.monotonic() - self._since > _LONG_S:
-            self.doing.visible = self.bar.visible = self.cancel.visible = True
-        self.put(self.bar, min(100.0, 100.0 * done / max(total, 1)))
-
-    def ended(self) -> None:
-        """Nothing is going on any more."""
-        self.doing.visible = self.bar.visible = self.cancel.visible = False
-
     def undo(self, _: Any = None) -> None:
         """Take the last change back."""
         self._go(self.studio.desk.session.undo(), "undo")
@@ -198,4 +221,4 @@ class Panel:
         doubtful = [key for key in studio.desk.objects()[1:] if studio.bench.results[key].doubtful]
         if doubtful:
             return f"look at {', '.join(doubtful)}: some regions are in doubt; paint them right."
-        return "save what you need in **5 Save**."
+        return "save what you need in **5 Save**, or see it on an arm in **6 Robot**."

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nrdf.errors import ProcessError
 from nrdf.export.registry import FORMATS
 from nrdf.process.job_folder import PAGE
 from nrdf.studio.bench import Result
@@ -83,15 +82,7 @@ class SaveTab:
 
     def _chosen(self) -> tuple[str, Result]:
         name = self.target.value
-        result = self.studio.bench.results.get(name)
-        if result is None:
-            raise ProcessError("nothing has been brought to a target yet: do so in step 4")
-        if not self.studio.bench.is_current(name):
-            raise ProcessError(
-                f"what is on {name} is of before your last change: press 'Bring the process there' "
-                "in step 4 first"
-            )
-        return name, result
+        return name, self.studio.bench.ready(name)
 
     def _tell(self, place: Path, command: str = "") -> None:
         lines = [f"Written to `{place}`."]

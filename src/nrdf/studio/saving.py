@@ -34,7 +34,7 @@ def save_knowledge(desk: Desk) -> Path:
     """
     knowledge, document = knowledge_of(desk.session, desk.document), desk.document
     assert document.reference is not None  # else there is no knowledge
-    place = _place(desk, "knowledge")
+    place = place_of(desk, "knowledge")
     with output_folder(place, overwrite=True) as folder:
         file = f"{knowledge.category}.yaml"
         write_knowledge(folder / file, knowledge, explained=True)
@@ -44,7 +44,7 @@ def save_knowledge(desk: Desk) -> Path:
 
 def save_job(desk: Desk, name: str, result: Result, origin: Mapping[str, Any]) -> Path:
     """A target's job, as `nrdf transfer` writes it; its folder."""
-    place = _place(desk, name, "job")
+    place = place_of(desk, name, "job")
     with output_folder(place, overwrite=True) as folder:
         write_transfer(folder, result.transferred, Limits(), name, origin)
     return place
@@ -52,7 +52,7 @@ def save_job(desk: Desk, name: str, result: Result, origin: Mapping[str, Any]) -
 
 def save_programs(desk: Desk, name: str, result: Result, formats: Sequence[str]) -> Path:
     """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
-    place = _place(desk, name, "programs")
+    place = place_of(desk, name, "programs")
     with output_folder(place, overwrite=True) as folder:
         export_job(job_of(result.transferred), formats, folder)
     return place
@@ -71,7 +71,7 @@ def save_picture(desk: Desk, bench: Bench) -> Path:
         result = bench.results.get(target.object.name)
         if result is not None:
             panels.append(panel_of(result.transferred, target.object.name))
-    place = _place(desk, "picture.png")
+    place = place_of(desk, "picture.png")
     place.parent.mkdir(parents=True, exist_ok=True)
     draw_regions(panels, place)
     return place
@@ -87,6 +87,7 @@ def zipped(folder: Path) -> bytes:
     return buffer.getvalue()
 
 
-def _place(desk: Desk, *parts: str) -> Path:
+def place_of(desk: Desk, *parts: str) -> Path:
+    """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
     # Names of targets have no separators: `Desk.add_target` sees to it.
     return desk.session.folder.joinpath(SAVED, *parts)

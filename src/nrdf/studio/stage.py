@@ -9,12 +9,15 @@ import numpy as np
 import viser
 
 from nrdf.process.surface import unit
+from nrdf.similarity import about_up
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit
 
 FOV_RAD = np.radians(48.0)
 _FROM = np.array([0.86, 0.52, 0.34])
 """Where the camera stands, seen from the objects: before them, above, to their right."""
+_FROM_BESIDE = np.array([0.42, 0.36, 0.83])
+"""The same where an arm stands before the object."""
 _ROOM = 1.06  # times the distance at which all is just seen
 _ABOVE = 0.14  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
@@ -31,7 +34,7 @@ class Figure:
     def __init__(self, stage: Stage, key: str, number: int, body: Body) -> None:
         self.key, self.body, self.stage = key, body, stage
         self.path = f"/object{number}"
-        self.offset = np.zeros(3)
+        self.offset, self._rotation = np.zeros(3), np.eye(3)
         scene = stage.server.scene
         self.frame = scene.add_frame(self.path, show_axes=False)
         self.points = scene.add_point_cloud(
@@ -72,7 +75,7 @@ class Figure:
         low, high = self.body.low * self.stage.factor, self.body.high * self.stage.factor
         high[1] += _ABOVE
         choice = np.array(list(product((False, True), repeat=3)))
-        return np.where(choice, high, low) + self.offset
+        return np.where(choice, high, low) @ self._rotation.T + self.offset
 
     @property
     def top(self) -> np.ndarray:
@@ -80,10 +83,11 @@ class Figure:
         middle = (self.body.low + self.body.high) / 2
         return np.array([middle[0], self.body.high[1], middle[2]])
 
-    def stand(self, offset: np.ndarray) -> None:
-        """Move the object; offset (3,) in the scene."""
-        self.offset = offset
+    def stand(self, offset: np.ndarray, turn_rad: float = 0.0) -> None:
+        """Move the object, turned about its upright axis; offset (3,) in the scene."""
+        self.offset, self._rotation = offset, about_up(turn_rad)
         self.frame.position = tuple(offset)
+        self.frame.wxyz = (np.cos(turn_rad / 2), 0.0, np.sin(turn_rad / 2), 0.0)
 
     def paint(self, colours: np.ndarray) -> None:
         """Colours (k, 3) uint8 of the shown points, which are shaded here."""
@@ -139,16 +143,16 @@ class Figure:
         found = hit(
             self.body.points,
             self.body.normals,
-            (origin - self.offset) / self.stage.factor,
-            direction,
+            (origin - self.offset) @ self._rotation / self.stage.factor,
+            direction @ self._rotation,
             self.body.surface.spacing,
         )
         return None if found is None else (found[0], found[1] * self.stage.factor)
 
     def view(self, view: View) -> View:
         """A camera of the scene as the object sees it, m."""
-        position = (view.position - self.offset) / self.stage.factor
-        return View(position, view.rotation, view.fov_rad, view.aspect)
+        position = (view.position - self.offset) @ self._rotation / self.stage.factor
+        return View(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
 
     def remove(self) -> None:
         """Take the object and all that is drawn of it away."""
@@ -206,15 +210,18 @@ class Stage:
             figure.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
 
-    def camera(self, shown: Sequence[str], aspect: float) -> tuple[np.ndarray, np.ndarray]:
+    def camera(
+        self, shown: Sequence[str], aspect: float, beside: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Where a camera with that width over height stands to see the objects `shown` from the
-        front, and what it looks at."""
+        front, or with places (k, 3) beside them from their right, and what it looks at."""
         figures = [figure for key, figure in self.figures.items() if key in shown]
-        corners = np.array([corner for figure in figures for corner in figure.corners])
+        more = np.zeros((0, 3)) if beside is None else beside
+        corners = np.concatenate([more, *(figure.corners for figure in figures)])
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        toward = unit(_FROM)
+        toward = unit(_FROM if beside is None else _FROM_BESIDE)
         right = unit(np.cross([0.0, 1.0, 0.0], toward))
         axes = np.stack([right, np.cross(toward, right), toward])
         seen = (corners - middle) @ axes.T

@@ -52,6 +52,12 @@ class Worker:
         with self._changed:
             return self._running is not None or bool(self._waiting)
 
+    def does(self, kind: str) -> bool:
+        """Whether a job of that kind runs or waits."""
+        with self._changed:
+            running = [] if self._running is None else [self._running]
+            return any(job.kind == kind for job in (*running, *self._waiting))
+
     def submit(
         self, kind: str, what: str, work: Callable[[Progress], None], delay_s: float = 0.0
     ) -> None:

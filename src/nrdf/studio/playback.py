@@ -1,0 +1,236 @@
+"""A simulated job as it can be shown: shapes, and where they are at every moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from nrdf.robot.cell import COLUMN_M
+from nrdf.robot.engine import mujoco
+from nrdf.robot.figures import report_of
+from nrdf.robot.scene import specification
+from nrdf.robot.timing import STEP_S
+from nrdf.robot.trajectories import rows
+
+if TYPE_CHECKING:
+    from nrdf.robot.simulate import DrivenPath, Simulated
+
+FLOOR = -1  # the body of what does not move
+EVERY_PATH = -1
+_OF_TOOL = "nrdf_"  # begins the names of what the cell adds to the arm
+_SEEN_GROUPS = 3  # MuJoCo's viewers show shapes of the first three
+_SECTIONS = 20
+_GREY = (120, 124, 130)
+_TABLE_M = (0.2, 0.02)  # radius and height of what the object stands on
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A mesh on a body: vertices (v, 3), m, in the body's frame (the cell's for `FLOOR`); faces
+    (f, 3); colour red, green, blue, 0 to 255; path: the tool path during which it is there, or
+    `EVERY_PATH`."""
+
+    body: int
+    vertices: np.ndarray
+    faces: np.ndarray
+    colour: tuple[int, int, int]
+    path: int = EVERY_PATH
+
+
+@dataclass(frozen=True)
+class Playback:
+    """A job on an arm, in the cell's frame (`nrdf.robot.cell.Placement`), about every 40 ms.
+
+    times: (t,), s, and what is at each: path (t,), the number of the tool path; doing: (t,) as
+    `nrdf.robot.program.Kind`; line (t,), -1 where none is driven; force_n (t,); turn_rad (t,), of
+    the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies. T_cell_object:
+    (4, 4), of the object at turn 0. missed: (k, 3), waypoints that are not reached, in the object's
+    frame, m. report: what report.json says.
+    """
+
+    shapes: tuple[Shape, ...]
+    times: np.ndarray
+    path: np.ndarray
+    doing: np.ndarray
+    line: np.ndarray
+    force_n: np.ndarray
+    turn_rad: np.ndarray
+    positions: np.ndarray
+    quaternions_wxyz: np.ndarray
+    T_cell_object: np.ndarray
+    missed: np.ndarray
+    report: dict[str, Any]
+
+    @property
+    def seconds(self) -> float:
+        """How long the job takes."""
+        return float(self.times[-1])
+
+    def at(self, time_s: float) -> int:
+        """The index of a moment."""
+        return int(np.clip(np.searchsorted(self.times, time_s), 0, len(self.times) - 1))
+
+
+def playback_of(simulated: Simulated) -> Playback:
+    """A simulation as it can be shown."""
+    shapes: list[Shape] = _standing(simulated)
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in _TIMELINE}
+    clock, turn = 0.0, None
+    for number, driven in enumerate(simulated.paths):
+        model = specification(driven.cell).compile()
+        made = _shapes(model, number)
+        shapes += [shape for shape in made if number == 0 or shape.path == number]
+        mover = _Mover(model, driven, simulated.placement.T_cell_base())
+        for log in driven.logs:
+            kept = rows(log)
+            count = len(kept)
+            positions, quaternions = mover(log.joints[kept])
+            angle = driven.cell.turns_rad[log.action.turn]
+            turn = angle if turn is None else turn
+            step = (angle - turn + np.pi) % (2 * np.pi) - np.pi
+            line = driven.lines[log.action.line].number if log.action.line >= 0 else -1
+            added = {
+                "times": clock + kept * STEP_S,
+                "path": np.full(count, number),
+                "doing": np.full(count, log.action.kind),
+                "line": np.full(count, line),
+                "force_n": log.force_n[kept],
+                "turn_rad": turn + step * np.linspace(1 / count, 1, count),
+                "positions": positions.astype(np.float32),
+                "quaternions_wxyz": quaternions.astype(np.float32),
+            }
+            for name, values in added.items():
+                parts[name].append(values)
+            clock += len(log.joints) * STEP_S
+            turn = angle
+    return Playback(
+        tuple(shapes),
+        **{name: np.concatenate(values) for name, values in parts.items()},
+        T_cell_object=_upright(simulated),
+        missed=np.concatenate([_missed(driven) for driven in simulated.paths]),
+        report=report_of(simulated),
+    )
+
+
+_TIMELINE = (
+    "times", "path", "doing", "line", "force_n", "turn_rad", "positions", "quaternions_wxyz",
+)  # fmt: skip
+
+
+class _Mover:
+    """The bodies' poses in the cell's frame at given joints."""
+
+    def __init__(self, model: Any, driven: DrivenPath, T_cell_base: np.ndarray) -> None:
+        self._model, self._data = model, mujoco.MjData(model)
+        names = driven.cell.arm.joint_names
+        self._joints = model.jnt_qposadr[[model.joint(name).id for name in names]]
+        self._place = T_cell_base[:3, 3]
+        self._turn = T_cell_base[:3, :3]
+
+    def __call__(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (t, b, 3) and quaternions, scalar first, (t, b, 4) at joints (t, n)."""
+        places = np.zeros((len(joints), self._model.nbody - 1, 3))
+        matrices = np.zeros((len(joints), self._model.nbody - 1, 9))
+        for k, values in enumerate(joints):
+            self._data.qpos[self._joints] = values
+            mujoco.mj_kinematics(self._model, self._data)
+            places[k], matrices[k] = self._data.xpos[1:], self._data.xmat[1:]
+        turned = self._turn @ matrices.reshape(-1, 3, 3)
+        quaternions = np.roll(Rotation.from_matrix(turned).as_quat(), 1, axis=1)
+        return places @ self._turn.T + self._place, quaternions.reshape(*places.shape[:2], 4)
+
+
+def _shapes(model: Any, path: int) -> list[Shape]:
+    """The meshes of an arm with a path's tool; bodies are numbered from 0, the base."""
+    groups = model.geom_group < _SEEN_GROUPS
+    made = []
+    for geom in np.flatnonzero(groups if groups.any() else np.ones(model.ngeom, bool)):
+        mesh = _mesh(model, int(geom))
+        if mesh is None:
+            continue
+        turn = Rotation.from_quat(np.roll(model.geom_quat[geom], -1)).as_matrix()
+        vertices = mesh.vertices @ turn.T + model.geom_pos[geom]
+        material = int(model.geom_matid[geom])
+        colour = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+        tool = model.geom(geom).name.startswith(_OF_TOOL)
+        made.append(
+            Shape(
+                int(model.geom_bodyid[geom]) - 1,
+                vertices.astype(np.float32),
+                np.asarray(mesh.faces, np.uint32),
+                _rgb(colour),
+                path if tool else EVERY_PATH,
+            )
+        )
+    return made
+
+
+def _mesh(model: Any, geom: int) -> trimesh.Trimesh | None:
+    """A shape in its own frame; None for one that has no end, such as a plane."""
+    kind, size, known = int(model.geom_type[geom]), model.geom_size[geom], mujoco.mjtGeom
+    if kind == int(known.mjGEOM_CAPSULE):
+        return trimesh.creation.capsule(2 * size[1], size[0], count=(_SECTIONS, 12))
+    if kind == int(known.mjGEOM_CYLINDER):
+        return trimesh.creation.cylinder(size[0], 2 * size[1], sections=_SECTIONS)
+    if kind == int(known.mjGEOM_BOX):
+        return trimesh.creation.box(2 * size)
+    if kind in (int(known.mjGEOM_SPHERE), int(known.mjGEOM_ELLIPSOID)):
+        round_one = trimesh.creation.icosphere(2)
+        sides = size if kind == int(known.mjGEOM_ELLIPSOID) else np.repeat(size[0], 3)
+        round_one.vertices *= sides
+        return round_one
+    if kind == int(known.mjGEOM_MESH):
+        mesh = model.mesh(model.geom_dataid[geom])
+        first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+        face, faces = int(mesh.faceadr[0]), int(mesh.facenum[0])
+        return trimesh.Trimesh(
+            model.mesh_vert[first : first + count], model.mesh_face[face : face + faces],
+            process=False,
+        )  # fmt: skip
+    return None
+
+
+def _standing(simulated: Simulated) -> list[Shape]:
+    """The column of the arm's base and what the object stands on, to see where the floor is."""
+    place = simulated.placement
+    x, y, z = place.base_m
+    stand, (radius, height) = place.stand_m, _TABLE_M
+    pieces = [((x, y), 0.0, z, COLUMN_M), ((0.0, 0.0), stand - height, stand, radius)]
+    pieces.append(((0.0, 0.0), 0.0, stand - height, 0.3 * radius))
+    made = []
+    for (px, py), low, high, wide in pieces:
+        if high - low > 1e-3:
+            mesh = trimesh.creation.cylinder(wide, high - low, sections=2 * _SECTIONS)
+            vertices = mesh.vertices + np.array([px, py, (low + high) / 2])
+            made.append(
+                Shape(FLOOR, vertices.astype(np.float32), np.asarray(mesh.faces, np.uint32), _GREY)
+            )
+    return made
+
+
+def _upright(simulated: Simulated) -> np.ndarray:
+    """T_cell_object (4, 4) before the turntable has turned."""
+    place = simulated.placement
+    poses = place.T_cell_object(simulated.solid, simulated.work.up)
+    back = np.eye(4)
+    back[:3, :3] = Rotation.from_euler("z", -place.turns_rad[0]).as_matrix()
+    return np.asarray(back @ poses[0])
+
+
+def _missed(driven: DrivenPath) -> np.ndarray:
+    """Waypoints (k, 3) that are not reached, on the surface."""
+    height = driven.process.standoff_m
+    places = [
+        (line.positions + height * line.axes)[verdict != "reached"]
+        for line, verdict in zip(driven.lines, driven.outcome.verdicts, strict=True)
+    ]
+    return np.concatenate([np.zeros((0, 3)), *places])
+
+
+def _rgb(colour: np.ndarray) -> tuple[int, int, int]:
+    r, g, b = (round(255 * float(c)) for c in colour[:3])
+    return (r, g, b)
