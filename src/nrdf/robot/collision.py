@@ -30,31 +30,26 @@ class Collision:
 
 @dataclass(frozen=True)
 class Touch:
-    """A collision, the index of its action, and at which of its steps (t,) it is."""
+    """A collision, and at which of its action's steps (t,) it is."""
 
     collision: Collision
-    action: int
     steps: np.ndarray
 
 
-def find_touches(
-    cell: Cell, region: str, lines: Sequence[Line], logs: Sequence[Log]
-) -> list[Touch]:
+def touches_of(cell: Cell, region: str, lines: Sequence[Line], log: Log) -> list[Touch]:
     """Collisions of the joints that were really driven, at every step."""
     found = []
-    for index, log in enumerate(logs):
-        action = log.action
-        line = lines[action.line].number if action.line >= 0 else -1
-        if len(action.angles_rad):
-            there, turn = cell.turned(action.angles_rad), np.arange(len(log.joints))
-        else:
-            there, turn = cell, np.full(len(log.joints), action.turn)
-        for what, away in clearances(there, log.joints, turn).items():
-            hit = away < 0.0
-            if hit.any():
-                seconds, depth = float(hit.sum() * STEP_S), -float(away.min())
-                collision = Collision(region, action.kind, line, what, seconds, depth)
-                found.append(Touch(collision, index, hit))
+    action = log.action
+    line = lines[action.line].number if action.line >= 0 else -1
+    if len(action.angles_rad):
+        cell, turn = cell.turned(action.angles_rad), np.arange(len(log.joints))
+    else:
+        turn = np.full(len(log.joints), action.turn)
+    for what, away in clearances(cell, log.joints, turn).items():
+        hit = away < 0.0
+        if hit.any():
+            seconds, depth = float(hit.sum() * STEP_S), -float(away.min())
+            found.append(Touch(Collision(region, action.kind, line, what, seconds, depth), hit))
     return found
 
 

@@ -7,18 +7,18 @@ stroke is left out, and what is left is planned and driven again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nrdf.process.surface import Surface
 from nrdf.robot.cell import Cell
-from nrdf.robot.collision import Collision, Touch, find_touches
+from nrdf.robot.collision import Collision, Touch, touches_of
 from nrdf.robot.execute import Log, execute
 from nrdf.robot.inverse import Library
 from nrdf.robot.lines import Line
-from nrdf.robot.program import Action, PathProgram, program
+from nrdf.robot.program import Action, PathProgram, Planner
 from nrdf.robot.strokes import Piece, Stroke, between, with_leads
 
 _MOST_DRIVES = 6
@@ -55,48 +55,67 @@ def drive(
     shift_m: (3,) by which the object is off its place, in its own frame; clock is told each phase
     as it ends.
     """
+    planner = Planner(cell, lines, home, library, rng)
+    there = cell.shifted(shift_m)
     avoided: list[Collision] = []
+    logs: dict[int, Log] = {}
+    touches: dict[int, list[Touch]] = {}
     for round_ in range(_MOST_DRIVES):
-        planned = program(cell, lines, strokes, home, library, rng)
+        planned = planner.program(strokes, in_order=round_ > 0)
         clock("free moves")
-        logs = execute(cell, planned.actions, surface, shift_m)
+        driven = execute(cell, planned.actions, surface, shift_m, logs)
         clock("simulation")
-        touches = find_touches(cell.shifted(shift_m), region, lines, logs)
+        fresh = [log for log in driven if id(log.action) not in logs]
+        logs |= {id(log.action): log for log in fresh}
+        touches |= {id(log.action): touches_of(there, region, lines, log) for log in fresh}
         clock("collisions")
-        collisions = tuple(touch.collision for touch in touches)
-        # The arm only waits while the object turns.
-        avoidable = [touch for touch in touches if touch.collision.kind != "turn"]
+        found = [touches[id(action)] for action in planned.actions]
+        collisions = tuple(touch.collision for one in found for touch in one)
+        # While the object turns the arm only waits.
+        avoidable = [k for k, a in enumerate(planned.actions) if found[k] and a.kind != "turn"]
         if not avoidable or round_ + 1 == _MOST_DRIVES:
             break
-        avoided += collisions
-        strokes = _without(cell, lines, planned, avoidable, logs)
+        avoided += [touch.collision for k in avoidable for touch in found[k]]
+        steps = {k: np.any([touch.steps for touch in found[k]], axis=0) for k in avoidable}
+        strokes = _without(cell, lines, planned, driven, steps)
         clock("inverse kinematics")
-    return Drive(planned, tuple(logs), collisions, tuple(avoided))
+    return Drive(planned, tuple(driven), collisions, tuple(avoided))
 
 
 def _without(
     cell: Cell,
     lines: Sequence[Line],
     planned: PathProgram,
-    touches: Sequence[Touch],
     logs: Sequence[Log],
+    touching: Mapping[int, np.ndarray],
 ) -> list[Stroke]:
-    """The driven strokes without the parts in which something is touched."""
-    left = {(s.line, s.first): s for s in planned.strokes}
-    pieces: list[Piece] = []
-    for touch in touches:
-        action = planned.actions[touch.action]
-        if action.kind == "free":
-            action = _works_next(planned.actions, touch.action)
-        stroke = left.pop((action.line, action.first), None)
-        # A stroke may touch in more than one of its moves.
-        if stroke is not None and action.kind == "process" and touch.collision.kind == "process":
-            pieces += _parts(stroke, logs[touch.action].place[touch.steps])
-    again: list[Stroke | None] = []
+    """The strokes, in driving order, without the parts in which something is touched.
+
+    touching: by the index of an action, at which of its steps.
+    """
+    parts: dict[tuple[int, int], list[Piece]] = {}
+    for index, steps in touching.items():
+        action = planned.actions[index]
+        works = _works_next(planned.actions, index) if action.kind == "free" else action
+        key = (works.line, works.first)
+        parts.setdefault(key, [])
+        if action.kind == "process":
+            stroke = next(s for s in planned.given if (s.line, s.first) == key)
+            parts[key] = _parts(stroke, logs[index].place[steps])
+    pieces = [piece for some in parts.values() for piece in some]
+    again: dict[int, Stroke | None] = {}
     if pieces:
         ways = [(way, at) for way, at, _ in between(cell, lines, pieces)]
-        again = with_leads(cell, lines, pieces, ways)
-    return [*left.values(), *(stroke for stroke in again if stroke is not None)]
+        found = with_leads(cell, lines, pieces, ways)
+        again = {id(piece): stroke for piece, stroke in zip(pieces, found, strict=True)}
+    left: list[Stroke | None] = []
+    for stroke in planned.given:
+        key = (stroke.line, stroke.first)
+        if key in parts:
+            left += [again[id(piece)] for piece in parts[key]]
+        else:
+            left.append(stroke)
+    return [stroke for stroke in left if stroke is not None]
 
 
 def _works_next(actions: Sequence[Action], index: int) -> Action:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -48,11 +48,15 @@ class Action:
 
 @dataclass(frozen=True)
 class PathProgram:
-    """The actions of one tool path; strokes: those driven, without those that no free way leads
-    to."""
+    """The actions of one tool path.
+
+    strokes: those driven, without those that no free way leads to. given: the same as they were
+    asked for, before joints were wound or ways to and from them made longer.
+    """
 
     actions: tuple[Action, ...]
     strokes: tuple[Stroke, ...]
+    given: tuple[Stroke, ...]
 
 
 def find_home(cell: Cell, library: Library) -> np.ndarray:
@@ -71,46 +75,80 @@ def find_home(cell: Cell, library: Library) -> np.ndarray:
     return np.asarray(chosen[int(worth.argmax())])
 
 
-def program(
-    cell: Cell,
-    lines: Sequence[Line],
-    strokes: Sequence[Stroke],
-    home: np.ndarray,
-    library: Library,
-    rng: np.random.Generator,
-    progress: Callable[[], None] = lambda: None,
-) -> PathProgram:
-    """Drive strokes from home and back to it: turn by turn, and each time the nearest one next."""
-    actions: list[Action] = []
-    driven = []
-    ways: dict[int, Ways] = {}
-    turn = -1
-    node, at = 0, home
-    waiting = _ordered(strokes)
-    while waiting:
-        progress()
-        same = [s for s in waiting if s.turn == waiting[0].turn]
-        stroke = min(same, key=lambda s: float(np.abs(s.whole()[0] - at).max()))
-        waiting = [s for s in waiting if s is not stroke]
-        net = ways.get(stroke.turn)
-        if net is None:
-            net = ways[stroke.turn] = Ways(cell, library, stroke.turn, home, rng)
-        stroke, start, stop = _joined(net, cell, stroke, home)
-        whole = stroke.whole()
-        if start is None or stop is None:
-            continue
-        if stroke.turn != turn:
-            if turn >= 0 and node:
-                actions.append(_free(cell, turn, ways[turn].way(node, 0)))
-            actions.append(_turned(cell, turn, stroke.turn, home))
-            turn, node = stroke.turn, 0
-        actions.append(_free(cell, turn, net.way(node, start)))
-        actions += _stroke(cell, lines[stroke.line], stroke)
-        driven.append(stroke)
-        node, at = stop, whole[-1]
-    if node:
-        actions.append(_free(cell, turn, ways[turn].way(node, 0)))
-    return PathProgram(tuple(actions), tuple(driven))
+class Planner:
+    """Plans programs for one tool path; what it has planned once it does not plan again."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        lines: Sequence[Line],
+        home: np.ndarray,
+        library: Library,
+        rng: np.random.Generator,
+    ) -> None:
+        self.cell, self.lines, self.home = cell, lines, home
+        self._library, self._rng = library, rng
+        self._ways: dict[int, Ways] = {}
+        self._joined: dict[int, tuple[Stroke, Stroke, int | None, int | None]] = {}
+        self._free: dict[tuple[int, int, int], Action] = {}
+        self._strokes: dict[int, list[Action]] = {}
+        self._turns: dict[tuple[int, int], Action] = {}
+
+    def program(self, strokes: Sequence[Stroke], in_order: bool = False) -> PathProgram:
+        """Drive strokes from home and back to it: turn by turn, and each time the nearest one next;
+        or, with `in_order`, as they come."""
+        actions: list[Action] = []
+        driven, planned = [], []
+        turn = -1
+        node, at = 0, self.home
+        waiting = list(strokes) if in_order else _ordered(strokes)
+        while waiting:
+            stroke = waiting[0]
+            if not in_order:
+                same = [s for s in waiting if s.turn == waiting[0].turn]
+                stroke = min(same, key=lambda s: float(np.abs(s.whole()[0] - at).max()))
+            waiting = [s for s in waiting if s is not stroke]
+            joined, start, stop = self._join(stroke)
+            if start is None or stop is None:
+                continue
+            if stroke.turn != turn:
+                if turn >= 0 and node:
+                    actions.append(self._freely(turn, node, 0))
+                actions.append(self._turn(turn, stroke.turn))
+                turn, node = stroke.turn, 0
+            actions.append(self._freely(turn, node, start))
+            if id(joined) not in self._strokes:
+                line = self.lines[stroke.line]
+                self._strokes[id(joined)] = _stroke(self.cell, line, joined)
+            actions += self._strokes[id(joined)]
+            driven.append(joined)
+            planned.append(stroke)
+            node, at = stop, joined.whole()[-1]
+        if node:
+            actions.append(self._freely(turn, node, 0))
+        return PathProgram(tuple(actions), tuple(driven), tuple(planned))
+
+    def _join(self, stroke: Stroke) -> tuple[Stroke, int | None, int | None]:
+        if stroke.turn not in self._ways:
+            self._ways[stroke.turn] = Ways(
+                self.cell, self._library, stroke.turn, self.home, self._rng
+            )
+        # With the stroke itself: its number is taken by another when it is gone.
+        if id(stroke) not in self._joined:
+            found = _joined(self._ways[stroke.turn], self.cell, stroke, self.home)
+            self._joined[id(stroke)] = (stroke, *found)
+        return self._joined[id(stroke)][1:]
+
+    def _freely(self, turn: int, one: int, other: int) -> Action:
+        if (turn, one, other) not in self._free:
+            way = self._ways[turn].way(one, other)
+            self._free[turn, one, other] = _free(self.cell, turn, way)
+        return self._free[turn, one, other]
+
+    def _turn(self, before: int, after: int) -> Action:
+        if (before, after) not in self._turns:
+            self._turns[before, after] = _turned(self.cell, before, after, self.home)
+        return self._turns[before, after]
 
 
 def _ordered(strokes: Sequence[Stroke]) -> list[Stroke]:

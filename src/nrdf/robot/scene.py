@@ -97,7 +97,12 @@ class Machine:
         T = cell.tool.T_flange_tcp
         self._tip, self._axis = T[:3, 3].copy(), T[:3, 2].copy()
         self._weight = float(self.model.body_mass[self._tool]) * np.array([0.0, 0.0, 9.81])
-        self.data.qpos[self._position] = start
+        self.start(start)
+
+    def start(self, joints: np.ndarray) -> None:
+        """Be at rest at joints (n,)."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[self._position] = joints
         mujoco.mj_forward(self.model, self.data)
 
     @property
