@@ -181,9 +181,10 @@ def test_the_zoo_keeps_it_apart_from_the_fields(trained, untrained, tmp_path, mo
         load_yaw(untrained)
 
 
-def test_every_category_of_the_zoo_has_one():
-    for entry in list_models():
+def test_what_ships_is_whole_and_small():
+    shipped = list_models(yaws.YAW_ZOO)
+    assert {"car", "plane"} <= {entry.name for entry in shipped}
+    for entry in shipped:
         found = yaws.find_yaw(entry.category)
         assert found is not None and found.config.bins % 12 == 0
-    shipped = list_models(yaws.YAW_ZOO)
-    assert all(entry.bytes < 500_000 and entry.scores["wrong-yaws"] < 0.2 for entry in shipped)
+        assert entry.bytes < 500_000 and entry.scores["wrong-yaws"] < 0.1
