@@ -21,6 +21,7 @@ from nrdf.studio.mouse import Mouse
 from nrdf.studio.panel import Activity, Panel
 from nrdf.studio.session import Session
 from nrdf.studio.stage import Figure, Stage
+from nrdf.studio.teaching import ORIGIN
 from nrdf.studio.trial import Trial
 from nrdf.studio.worker import Progress, Worker
 
@@ -292,6 +293,7 @@ class Studio:
 
     def tell(self, title: str, body: str, bad: bool = True) -> None:
         """A notification on every open page."""
+        body = body.removeprefix(f"{ORIGIN}: ")
         for client in self.server.get_clients().values():
             client.add_notification(
                 title, body, color="red" if bad else "teal", auto_close_seconds=15 if bad else 6
