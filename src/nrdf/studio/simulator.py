@@ -73,7 +73,7 @@ class Simulator:
         return made
 
     def end(self) -> None:
-        """End the process; what it has written half is removed, and who waits for it has cancelled."""
+        """End the process; what it has written half is removed. Who waits for it is cancelled."""
         self._ended = True
         self._pipe.close()
         self._process.terminate()
