@@ -29,7 +29,13 @@ class Page:
         self.weights, self.said = weights, []
         self.server = open_server("127.0.0.1", 8460)
         self.studio = Studio(Session(folder), self.server, self.load, ["chair"], {})
-        self.studio.tell = lambda title, body, bad=True: self.said.append(body)
+        tell = self.studio.tell
+
+        def heard(title, body, bad=True):
+            self.said.append(body)
+            tell(title, body, bad)
+
+        self.studio.tell = heard
         self.desk = self.studio.desk
         self.desk.open_reference("box.ply", cloud(), "chair")
         for name in ("top", "front"):
@@ -100,7 +106,7 @@ def test_regions_that_cannot_be(page):
 
 def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
     told = page.change(feed_mm_s=0.0)
-    assert told.startswith("❌ region 'top'")
+    assert told.startswith("⚠ region 'top'")
     assert "feed_m_s (*Speed, mm/s*): must be above 0.0, not 0.0" in told
     assert "feed_m_s: must be above 0.0" in page.bring()
     told = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
@@ -111,6 +117,9 @@ def test_without_a_model_or_a_result(page):
     assert "nothing has been brought to a target" in page.does(page.studio.trial.start, "new")
     page.weights = None
     assert "no model for 'chair'" in page.bring()
+    assert "no model for 'chair'" in page.studio.panel._trouble.content, "until the next act"
+    page.does(page.studio.panel.undo)
+    assert not page.studio.panel._trouble.visible
 
 
 def test_without_mujoco_the_button_says_what_to_install(page, monkeypatch):

@@ -102,6 +102,7 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(440)
         self.next = gui.add_markdown("")
+        self._trouble = gui.add_markdown("", visible=False)
         self.working = Activity(gui, lambda: studio.worker.cancel())
         self.driving = Activity(gui, lambda: studio.trial.worker.cancel())
         self.tool = gui.add_button_group("Mouse", TOOLS)
@@ -176,6 +177,12 @@ class Panel:
             self.hint.content = f"In your hand: **{tool}**. {_HINTS[tool]}"
             for tab in self._tabs:
                 tab.refresh()
+
+    def trouble(self, said: str) -> None:
+        """What went wrong last, or nothing."""
+        if self._trouble.content != said:
+            self._trouble.content = said
+            self._trouble.visible = bool(said)
 
     def undo(self, _: Any = None) -> None:
         """Take the last change back."""

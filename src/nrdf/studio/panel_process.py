@@ -108,7 +108,7 @@ class ProcessTab:
         if plan is None:
             return "*planning …*"
         if plan.fault or plan.checked is None or plan.checked.measures is None:
-            return f"❌ {_labelled(plan.fault)}"
+            return f"⚠ {_labelled(plan.fault)}"
         measures = plan.checked.measures
         coverage, widest, off, axis, _ = short_figures(vars(measures))
         minutes, seconds = divmod(round(measures.cycle_time_s), 60)
