@@ -67,6 +67,54 @@ def test_what_a_playback_holds(playback):
     assert lowest == pytest.approx(0.0), "the floor"
 
 
+@pytest.fixture
+def stage(job):  # noqa: F811
+    """A stage with the plate that the job is on; without a browser."""
+    pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
+    from nrdf.studio.serving import open_server
+    from nrdf.studio.stage import Stage
+
+    server = open_server("127.0.0.1", 8465)
+    made = Stage(server)
+    made.clear(2.5)
+    yield made
+    server.stop()
+
+
+def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, job):  # noqa: F811
+    from nrdf.studio.body import Body
+    from nrdf.studio.rig import Rig
+
+    plate = Body(read_work(job).lesson.cloud)
+    figure = stage.add("plate", plate)
+    stage.arrange(["plate"])
+    stood = figure.offset
+    rig = Rig(figure, playback)
+    pad = next(s for s in playback.shapes if s.path == 0 and s.colour[0] > 2 * s.colour[2])
+    frames = {handle.name: handle for handle in (rig._root, *rig._bodies.values())}
+
+    def placed(name, points):
+        frame = frames[name]
+        turn = Rotation.from_quat(np.roll(frame.wxyz, -1))
+        return turn.apply(points) + frame.position
+
+    for at in np.flatnonzero(playback.doing == "process")[20::40]:
+        rig.show(int(at))
+        scene = placed("/arm", placed(f"/arm/body{pad.body}", pad.vertices * stage.factor))
+        down = np.array([0.0, -1.0, 0.0])
+        met = stage.hit(scene.mean(axis=0) - down, down)
+        assert met is not None, "the object is below the pad, turned as the turntable is"
+        turned = Rotation.from_quat(np.roll(figure.frame.wxyz, -1))
+        assert turned.magnitude() == pytest.approx(playback.turn_rad[at])
+        point = turned.apply(plate.points[met[1]] * stage.factor) + figure.frame.position
+        assert scene[:, 1].min() == pytest.approx(point[1], abs=0.006 * stage.factor)
+    seen = rig.places
+    assert len(seen) and seen[:, 1].min() < 0.0, "the column's foot is below the raised object"
+    rig.remove()
+    np.testing.assert_allclose(figure.offset, stood, atol=1e-12)
+    assert figure.frame.wxyz[0] == pytest.approx(1.0)
+
+
 def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
     job,  # noqa: F811
     tmp_path,

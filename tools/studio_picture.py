@@ -1,4 +1,5 @@
-"""Draw docs/studio.png: the studio with the bundled chair's processes, brought to another chair.
+"""Draw docs/studio.png, the studio with the bundled chair's processes brought to another chair, and
+docs/studio-arm.png, the same on the arm in simulation.
 
     python tools/studio_picture.py CHROMIUM
 
@@ -22,14 +23,14 @@ from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
 from nrdf.studio.uploads import bundled
 
-PICTURE = Path(__file__).parents[1] / "docs" / "studio.png"
+DOCS = Path(__file__).parents[1] / "docs"
 FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader")  # fmt: skip
 SIZE = {"width": 1500, "height": 900}
 
 
 def main() -> None:
-    """Set the studio up, open it and take the picture."""
+    """Set the studio up, open it and take the pictures."""
     server = open_server("127.0.0.1", 8490)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         studio = Studio(Session(folder), server, nrdf.load_model, ["chair"], {})
@@ -47,7 +48,17 @@ def main() -> None:
             close.click()
         studio.arrange()
         time.sleep(5)
-        page.screenshot(path=PICTURE)
+        page.screenshot(path=DOCS / "studio.png")
+        page.get_by_role("tab", name="6 Robot").click()
+        studio.trial.start(TARGETS[2])
+        studio.trial.worker.wait(900)
+        playback = studio.trial.playback
+        assert playback is not None, "the simulation failed"
+        at_work = playback.times[playback.doing == "process"]
+        studio.trial.seek(float(at_work[len(at_work) // 3]))
+        studio.panel.refresh()
+        time.sleep(5)
+        page.screenshot(path=DOCS / "studio-arm.png")
         browser.close()
         studio.stop()
     server.stop()

@@ -33,7 +33,7 @@ def studio(
         robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
         tool_frame: Body or site of the robot that the tool is mounted on.
     """
-    from nrdf.errors import OutputError
+    from nrdf.errors import ModelError, OutputError
 
     try:
         import viser  # noqa: F401
@@ -47,10 +47,12 @@ def studio(
     from nrdf.studio.serving import LOOPBACK, open_server
     from nrdf.studio.session import Session
 
+    categories = [entry.category for entry in list_models()]
+    if not categories:
+        raise ModelError("there is no trained model in this installation: install nrdf again")
     kept = Session(session)
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
-    categories = [entry.category for entry in list_models()]
     app = Studio(
         kept, server, lambda name: nrdf.load_model(name, device), categories, origin, robot,
         tool_frame,

@@ -21,6 +21,7 @@ from nrdf.studio.mouse import Mouse
 from nrdf.studio.panel import Activity, Panel
 from nrdf.studio.session import Session
 from nrdf.studio.stage import Figure, Stage
+from nrdf.studio.teaching import ORIGIN
 from nrdf.studio.trial import Trial
 from nrdf.studio.worker import Progress, Worker
 
@@ -281,6 +282,7 @@ class Studio:
     def answering(self) -> Iterator[None]:
         """A block that holds the lock; what goes wrong in it is said on the page."""
         with self.lock:
+            self.panel.trouble("")
             try:
                 yield
             except NrdfError as error:
@@ -291,7 +293,10 @@ class Studio:
                 self.tell("A fault of nrdf", f"{type(error).__name__}: {error}")
 
     def tell(self, title: str, body: str, bad: bool = True) -> None:
-        """A notification on every open page."""
+        """A notification on every open page; what is bad stays in the panel until the next act."""
+        body = body.removeprefix(f"{ORIGIN}: ")
+        if bad:
+            self.panel.trouble(f"⚠ **{title}**: {body}")
         for client in self.server.get_clients().values():
             client.add_notification(
                 title, body, color="red" if bad else "teal", auto_close_seconds=15 if bad else 6

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 NO_REGION = "(none yet)"
 _LONG_S = 0.7
 _HINTS = {
-    "Turn": "drag turns, the wheel zooms, the right button moves.",
-    "Grow": "click the surface: a patch grows from there. Its **radius** is in step 2.",
-    "Brush": "drag over the surface; drag beside the object to turn.",
-    "Box": "drag a rectangle over what you mean; take Turn to turn again.",
-    "Arrow": "drag on the reference, along the lines that the tool shall drive.",
-    "Alike": "move over the reference with the button held (or click): places that are like the "
+    "Turn": "Drag turns, the wheel zooms, the right button moves.",
+    "Grow": "Click the surface: a patch grows from there. Its **radius** is in step 2.",
+    "Brush": "Drag over the surface; drag beside the object to turn.",
+    "Box": "Drag a rectangle over what you mean; take Turn to turn again.",
+    "Arrow": "Drag on the reference, along the lines that the tool shall drive.",
+    "Alike": "Move over the reference with the button held (or click): places that are like the "
     "one under the cursor light up. How far that reaches: a slider in step 4.",
 }
 
@@ -102,6 +102,7 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(440)
         self.next = gui.add_markdown("")
+        self._trouble = gui.add_markdown("", visible=False)
         self.working = Activity(gui, lambda: studio.worker.cancel())
         self.driving = Activity(gui, lambda: studio.trial.worker.cancel())
         self.tool = gui.add_button_group("Mouse", TOOLS)
@@ -172,9 +173,16 @@ class Panel:
             self.offer(self.region, tuple(names) or (NO_REGION,))
             self.put(self.region, studio.region or NO_REGION)
             self.next.content = f"**Next:** {self._what_is_next()}"
-            self.hint.content = f"**{studio.mouse.tool}**: {_HINTS[studio.mouse.tool]}"
+            tool = studio.mouse.tool
+            self.hint.content = f"In your hand: **{tool}**. {_HINTS[tool]}"
             for tab in self._tabs:
                 tab.refresh()
+
+    def trouble(self, said: str) -> None:
+        """What went wrong last, or nothing."""
+        if self._trouble.content != said:
+            self._trouble.content = said
+            self._trouble.visible = bool(said)
 
     def undo(self, _: Any = None) -> None:
         """Take the last change back."""
@@ -214,7 +222,10 @@ class Panel:
         if bare:
             return f"take *Grow* and click the surface where **{bare[0]}** is."
         if not document.targets:
-            return "describe what is done in **3 Process**, then add an object in **4 Targets**."
+            return (
+                f"click on to let **{studio.region}** grow, or press *New region* for another "
+                "place; say what is done to each in **3 Process**; then go to **4 Targets**."
+            )
         waiting = [key for key in studio.desk.objects()[1:] if not studio.bench.is_current(key)]
         if waiting:
             return f"in **4 Targets**, press *Bring the process there* ({', '.join(waiting)})."

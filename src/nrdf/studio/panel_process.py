@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from nrdf.process.knowledge_new import KINDS
 from nrdf.process.report import short_figures
-from nrdf.studio.teaching import NUMBERS, PATTERNS, shown_numbers
+from nrdf.studio.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
 
 if TYPE_CHECKING:
     from nrdf.studio.panel import Panel, Said
@@ -107,7 +108,7 @@ class ProcessTab:
         if plan is None:
             return "*planning …*"
         if plan.fault or plan.checked is None or plan.checked.measures is None:
-            return f"❌ {plan.fault}"
+            return f"⚠ {_labelled(plan.fault)}"
         measures = plan.checked.measures
         coverage, widest, off, axis, _ = short_figures(vars(measures))
         minutes, seconds = divmod(round(measures.cycle_time_s), 60)
@@ -168,6 +169,14 @@ class ProcessTab:
         self.studio.draw()
         self.panel.refresh()
         self.studio.plan()
+
+
+def _labelled(fault: str) -> str:
+    """A fault with the page's names of fields beside those of a knowledge file."""
+    fault = fault.removeprefix(f"{ORIGIN}: ")
+    for name, (label, _) in _LABELS.items():
+        fault = re.sub(rf"\b{si_name(name)}\b", f"{si_name(name)} (*{label}*)", fault, count=1)
+    return fault
 
 
 def _increment(name: str) -> float:

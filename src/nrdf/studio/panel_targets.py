@@ -25,7 +25,7 @@ class TargetsTab:
         self.panel, self.studio = panel, panel.studio
         gui = self.studio.server.gui
         gui.add_markdown("Add other objects of the kind, and bring the process there.")
-        self.bundled = gui.add_dropdown("Bundled chair", BUNDLED[1:])
+        self.bundled = gui.add_dropdown("Bundled chair", (*BUNDLED[1:], ALL))
         self.add = gui.add_button("Add the bundled chair")
         self.unit = gui.add_dropdown("A file's unit", (AS_IN_FILE, *METRES))
         self.upload = gui.add_upload_button("Add a file …", mime_type=",".join(ENDINGS))
@@ -62,7 +62,7 @@ class TargetsTab:
         studio = self.studio
         result = studio.bench.results.get(key)
         if result is None:
-            return f"**{key}**: waits."
+            return f"**{key}**: waits for *Bring the process there*."
         report = report_of(result.transferred, Limits())
         old = "" if studio.bench.is_current(key) else " *(of before your last change)*"
         minutes, seconds = divmod(round(report["total"]["cycle_time_s"]), 60)
@@ -80,8 +80,9 @@ class TargetsTab:
         notes = [f"⚠ {warning}" for warning in report["warnings"]]
         return "\n".join([head, "", *rows, "", *(f"{note}  " for note in notes)])
 
-    def _add(self, name: str) -> None:
-        self._added(name, bundled(name))
+    def _add(self, chosen: str) -> None:
+        for name in BUNDLED[1:] if chosen == ALL else (chosen,):
+            self._added(name, bundled(name))
 
     def _load(self, file: Any) -> None:
         category = self.studio.desk.document.category
@@ -98,6 +99,12 @@ class TargetsTab:
     def _bring(self) -> None:
         if not self.studio.desk.document.targets:
             raise NrdfError("there is no target yet: add one above")
+        regions = self.studio.desk.document.regions
+        bare = ", ".join(region.name for region in regions if not region.mask.any())
+        if bare and any(region.mask.any() for region in regions):
+            self.studio.tell(
+                "Left out", f"{bare}: no points yet; paint them in step 2, or delete them there"
+            )
         self.studio.transfer()
 
     def _show(self, shown: str) -> None:

@@ -47,6 +47,7 @@ class Simulator:
         self._process = context.Process(
             target=_serve, args=(other, job, robot, tool_frame), daemon=True
         )
+        self._ended = False
         self._process.start()
         other.close()
 
@@ -72,7 +73,8 @@ class Simulator:
         return made
 
     def end(self) -> None:
-        """End the process; what it has written half is removed."""
+        """End the process; what it has written half is removed. Who waits for it is cancelled."""
+        self._ended = True
         self._pipe.close()
         self._process.terminate()
         self._process.join(_PATIENCE_S)
@@ -96,6 +98,8 @@ class Simulator:
                     continue
                 kind, value = self._pipe.recv()
             except (EOFError, OSError):
+                if self._ended:
+                    raise Cancelled from None
                 raise self._gone() from None
             if kind == "progress":
                 share = value

@@ -11,7 +11,7 @@ from nrdf.errors import ProcessError
 from nrdf.process.knowledge import Knowledge, Process, Trajectory
 from nrdf.process.knowledge_file import validated
 from nrdf.process.knowledge_new import DEFAULTS
-from nrdf.process.lesson import Lesson, bind, checksum
+from nrdf.process.lesson import Lesson, bind, checksum, overlaps
 from nrdf.studio.session import CLOUDS, Document, Painted, Session
 from nrdf.units import OTHER_UNITS, to_si
 
@@ -89,8 +89,14 @@ def knowledge_of(session: Session, document: Document) -> Knowledge:
 
 
 def lesson_of(session: Session, document: Document) -> Lesson:
-    """The document as knowledge on its reference. Raises ProcessError as `knowledge_of` and
-    `nrdf.process.lesson.bind` do."""
+    """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
+    as `knowledge_of` and `nrdf.process.lesson.bind` do."""
+    regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
+    for line in [] if document.allow_overlap else overlaps(regions):
+        raise ProcessError(
+            f"{line.partition(';')[0]}; erase those points, which are dark, from one of them in "
+            "step 2, or tick 'Regions may overlap' there"
+        )
     return bind(knowledge_of(session, document), session.folder / CLOUDS, ORIGIN)
 
 
@@ -120,6 +126,11 @@ def painted_of(lesson: Lesson, colours: Mapping[str, tuple[int, int, int]]) -> t
         steps = tuple(plain_step(process) for process in region.processes)
         painted.append(Painted(region.name, colours[region.name], mask, steps))
     return tuple(painted)
+
+
+def si_name(name: str) -> str:
+    """The name that an SI knowledge file has for a number that the page asks for."""
+    return _si(name)[0]
 
 
 def _si(name: str) -> tuple[str, float]:
