@@ -10,7 +10,8 @@ import nrdf
 from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.frames import tool_quaternions
-from nrdf.process.taught import TaughtLine
+from nrdf.process.surface import Surface
+from nrdf.process.taught import TaughtLine, feet_under
 from nrdf.regions.match import Mapped
 from taught_box import SIZE, cloud, faces
 
@@ -152,3 +153,14 @@ def test_a_mirror_image_is_asked_too_and_brought_back(model):
     mapped = way._mapped(points, normals)
     np.testing.assert_allclose(way.embedded.original(mapped.points), points, atol=0.01)
     np.testing.assert_allclose(mapped.normals, normals, atol=0.05)
+
+
+def test_a_foot_next_to_a_square_corner_is_on_the_tools_side():
+    box = cloud()
+    surface = Surface(box.points, box.normals)
+    x = np.linspace(-0.2, 0.2, 21)
+    places = np.c_[x, np.full(21, SIZE[1] / 2), np.full(21, SIZE[2] / 2 - 1e-3)]
+    upright = np.tile([0.0, 1.0, 1e-17], (21, 1))  # what rounding leaves of a right angle
+    feet, normals = feet_under(surface, places, upright)
+    np.testing.assert_allclose(normals, np.tile([0.0, 1.0, 0.0], (21, 1)), atol=1e-6)
+    np.testing.assert_allclose(feet, places, atol=1e-6)

@@ -66,3 +66,11 @@ def test_a_reference_without_normals_will_do_and_progress_is_told():
         type(taught)(taught.knowledge, bare, taught.regions), lambda *now: told.append(now)
     )
     assert [row.fault for row in rows] == ["", ""] and told == [(1, 2), (2, 2)]
+
+
+@pytest.mark.parametrize("trajectory", ["spiral", "contour"])
+def test_spirals_and_contours_leave_no_gaps_in_corners(trajectory):
+    row = checked(trajectory=trajectory)
+    stepover = row.process.distance_between_lines_m
+    assert row.measures.coverage > 0.95
+    assert row.measures.line_spacing_worst_m < 1.15 * stepover

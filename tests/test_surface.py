@@ -139,3 +139,14 @@ def test_points_without_normals_that_fit_are_refused():
         Surface(points[:5], normals[:5])
     with pytest.raises(ProcessError, match="at least 8 finite points"):
         Surface(np.where(points == points[3], np.nan, points), normals)
+
+
+def test_few_points_at_a_thin_parts_end_are_a_plane_of_their_own():
+    points, normals = board(spacing=0.012)
+    end = np.array([[0.41, 0.1, -0.003], [0.41, 0.12, -0.006], [0.41, 0.14, -0.004]])
+    surface = Surface(np.r_[points, end], np.r_[normals, np.tile([1.0, 0.0, 0.0], (3, 1))])
+    asked = end + np.array([0.002, 0.003, 0.0])
+    found, outward, off = surface.nearest(asked, np.tile([1.0, 0.0, 0.0], (3, 1)))
+    np.testing.assert_allclose(found[:, 0], 0.41, atol=1e-6)
+    np.testing.assert_allclose(outward, np.tile([1.0, 0.0, 0.0], (3, 1)), atol=1e-6)
+    np.testing.assert_allclose(off, 0.002, atol=1e-6)

@@ -9,7 +9,7 @@ from nrdf.process.patch import patches_of
 from nrdf.process.surface import Surface
 from nrdf.process.touch_up import fill_gaps, touch_up
 from nrdf.process.track import line_spacing, track_of
-from surfaces import board
+from surfaces import board, tube
 
 SURFACE = Surface(*board(spacing=0.008))
 ALL = np.arange(SURFACE.size)
@@ -73,3 +73,25 @@ def test_what_is_past_a_lines_end_is_no_neighbour():
     patches = patches_of(SURFACE, ALL)
     aslant = [line(0.1, 0.02, 0.2), line(0.14, 0.24, 0.38)]
     assert not len(line_spacing(patches, track_of(aslant, RADIUS, 0.04), 0.04).distance)
+
+
+def test_a_face_a_little_off_is_worked_but_single_points_are_not():
+    near = np.flatnonzero(np.abs(SURFACE.points - [0.2, 0.1, 0.0]).max(axis=1) < 0.006)
+    assert len(near) >= 3
+    assert touch_up(SURFACE, near, spread(0.02), SPACING, RADIUS, 0.04)
+    assert touch_up(SURFACE, near[:1], spread(0.02), SPACING, RADIUS, 0.04) == []
+
+
+def test_a_gap_round_a_bend_is_filled_on_the_surface():
+    surface = Surface(*tube(radius=0.08, length=0.3, turn=2.0))
+    patches = patches_of(surface, np.arange(surface.size))
+    z = np.arange(0.03, 0.27, SPACING)
+    lines = []
+    for angle in (-0.35, 0.35):
+        normal = np.array([np.cos(angle), np.sin(angle), 0.0])
+        contacts = 0.08 * normal + np.c_[np.zeros((len(z), 2)), z]
+        lines.append(Line(contacts, np.tile(normal, (len(z), 1))))
+    made = fill_gaps(surface, patches, lines, SPACING, RADIUS, 0.03)
+    assert len(made) == 1
+    np.testing.assert_allclose(np.linalg.norm(made[0].contacts[:, :2], axis=1), 0.08, atol=1e-3)
+    np.testing.assert_allclose(made[0].contacts[:, 1], 0.0, atol=2e-3)

@@ -85,11 +85,11 @@ def render_panels(
     names = list(dict.fromkeys(n for panel in panels for n in (*panel.regions, *panel.lines)))
     colours = region_colours(names)
     drawn = [_prepare(panel, names) for panel in panels]
-    rows = [_row(drawn, colours, FRONT, size)]
     hidden = _hidden_regions(drawn, len(names))
-    if hidden:
-        rows.append(_row(drawn, colours, _best_side(drawn, hidden), size))
-    return rows, colours
+    cameras = [FRONT, _best_side(drawn, hidden)] if hidden else [FRONT]
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        rows = pool.map(lambda camera: _row(drawn, colours, camera, size), cameras)
+        return list(rows), colours
 
 
 def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -53,8 +54,10 @@ def write_transfer(
         write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
     start = time.perf_counter()
     panel = panel_of(transferred, title)
-    draw_regions([panel], folder / PICTURE, _WHOLE)
-    details = render_details(panel, list(panel.regions), _DETAIL)
+    with ThreadPoolExecutor(2) as pool:
+        whole = pool.submit(draw_regions, [panel], folder / PICTURE, _WHOLE)
+        details = pool.submit(render_details, panel, list(panel.regions), _DETAIL).result()
+        whole.result()
     seconds = {**transferred.seconds, "pictures": time.perf_counter() - start}
     report = {"title": title, **report_of(transferred, limits), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}

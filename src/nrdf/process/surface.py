@@ -21,6 +21,7 @@ SAME_SIDE = 0.5
 _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
+_SURE = 0.5  # share of one of fewer points that are a plane, as at the end of a thin part
 _SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
 _ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
@@ -158,11 +159,12 @@ class Surface:
         """Places and normals as of `project`, and whether (m,) there is a surface around."""
         points, normals = np.array(points, dtype=np.float64), unit(normals)
         near = self._nearest_to(points, 3 * _FITTED)
+        around, facing = self.points[near], self.normals[near]
         fitted = np.zeros(len(points), bool)
         moving = np.arange(len(points))
         for number in range(_ROUNDS):
             places, outward, fitted[moving] = self._fit(
-                points[moving], normals[moving], near[moving]
+                points[moving], normals[moving], around[moving], facing[moving]
             )
             if number >= _WHOLE:  # the whole turn leads to and fro between two sets of points
                 outward = unit(outward + normals[moving])
@@ -176,31 +178,35 @@ class Surface:
         return points, normals, fitted
 
     def _fit(
-        self, points: np.ndarray, normals: np.ndarray, near: np.ndarray
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        around: np.ndarray,
+        around_normals: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """One step of `_settled`; near: (m, k) indices of the cloud points around."""
-        distance, facing = self._seen(points, normals, near)
+        """One step of `_settled`; around: (m, k, 3) cloud points, with their normals (m, k, 3)."""
+        offset = around - points[:, None]
+        distance, facing = self._seen(offset, around_normals, normals)
         # Shares fade to 0, or a place would find no rest where points come and go.
         share = np.maximum(facing - _LEVEL, 0.0) / (1.0 - _LEVEL)
         among = np.cumsum(share, axis=1) - share < _FITTED
         reach = 1.05 * (distance * (among & (share > 0.0))).max(axis=1, keepdims=True) + 1e-12
         weight = share * np.maximum(1.0 - (distance / reach) ** 2, 0.0) ** 2
-        count = (weight > 0).sum(axis=1)
-        fitted = count > 0
+        few = (weight > 0).sum(axis=1) < _LEAST
+        fitted = ~few | (share * (weight > 0) > _SURE).any(axis=1)
         # A place that no point is near is beyond the surface's edge.
         fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
         enough = fitted[:, None]
-        mean = np.einsum("mk,mka->ma", weight, self.normals[near])
+        mean = (weight[:, None] @ around_normals)[:, 0]
         normals = np.where(enough, unit(mean), normals)
         frame = tangent_frames(normals)
-        offset = np.einsum("mkb,mab->mka", self.points[near] - points[:, None], frame)
+        offset = offset @ frame.transpose(0, 2, 1)
         found = quadrics(offset[..., :2] / self.spacing, offset[..., 2:], weight)
         # Beyond an edge, quadrics run away.
-        few = fitted & (count < _LEAST)
-        if few.any():
-            share = weight[few] / np.maximum(weight[few].sum(axis=1, keepdims=True), 1e-12)
+        if few.any():  # a plane, as their normals have it
+            total = np.maximum(weight[few].sum(axis=1), 1e-12)
             found[few] = 0.0
-            found[few, 0, 0] = np.einsum("mk,mk->m", share, offset[few, :, 2])
+            found[few, 0, 0] = (weight[few] * offset[few, :, 2]).sum(axis=1) / total
         height = np.where(enough, np.clip(found[:, 0], -self.spacing, self.spacing), 0.0)
         slope = np.where(enough, found[:, 1:3, 0] / self.spacing, 0.0)
         tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
@@ -218,14 +224,14 @@ class Surface:
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
         points, normals = np.asarray(points, dtype=np.float64), unit(normals)
         near = self._nearest_to(points, count)
+        offset, around = self.points[near] - points[:, None], self.normals[near]
         turning = np.arange(len(points))
         for _ in range(_ROUNDS):
-            around = near[turning]
-            distance, facing = self._seen(points[turning], normals[turning], around)
+            distance, facing = self._seen(offset[turning], around[turning], normals[turning])
             # Fades to 0 at the sheet's edge, so that the average finds its rest.
             facing = np.maximum(facing - SAME_SIDE, 0.0)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
-            mean = np.einsum("mk,mka->ma", weight, self.normals[around])
+            mean = (weight[:, None] @ around[turning])[:, 0]
             found = np.where(weight.any(axis=1)[:, None], unit(mean), normals[turning])
             turned = np.linalg.norm(found - normals[turning], axis=1) > _SETTLED
             normals[turning] = found
@@ -238,14 +244,13 @@ class Surface:
         return self.tree.query(points, min(count, len(self.points)))[1]
 
     def _seen(
-        self, points: np.ndarray, normals: np.ndarray, near: np.ndarray
+        self, offset: np.ndarray, around: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Distances of the cloud points `near` (m, k), and cosines of their normals to `normals`
-        (m, 3), 0 for points of another sheet."""
-        offset = self.points[near] - points[:, None]
+        """Distances (m, k) of cloud points at offset (m, k, 3), and cosines of their normals,
+        around (m, k, 3), to normals (m, 3): 0 for points of another sheet."""
         distance = np.sqrt(np.einsum("mka,mka->mk", offset, offset))
-        facing = np.einsum("mka,ma->mk", self.normals[near], normals)
-        rise = np.abs(np.einsum("mka,ma->mk", offset, normals)) / self.spacing
+        facing = (around @ normals[:, :, None])[..., 0]
+        rise = np.abs((offset @ normals[:, :, None])[..., 0]) / self.spacing
         level = np.clip(3.0 + 1.5 * distance / self.spacing - 2.5 * rise, 0.0, 1.0)
         return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
 
@@ -265,9 +270,13 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 def tangent_frames(normals: np.ndarray) -> np.ndarray:
     """Right-handed frames (m, 3, 3) at unit normals (m, 3): rows are two tangents, the normal."""
-    helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    first = unit(np.cross(normals, helper))
-    return np.stack([first, np.cross(normals, first), normals], axis=1)
+    x, y, z = normals.T
+    zero = np.zeros_like(x)
+    flat = np.abs(x) < 0.7  # the first is square to the x axis, or to y where the normal is along x
+    first = np.stack([np.where(flat, zero, -z), np.where(flat, z, zero), np.where(flat, -y, x)])
+    u, v, w = first / np.maximum(np.sqrt((first * first).sum(axis=0)), 1e-12)
+    frames = np.stack([u, v, w, y * w - z * v, z * u - x * w, x * v - y * u, x, y, z], axis=1)
+    return frames.reshape(-1, 3, 3)
 
 
 def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -277,9 +286,9 @@ def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.n
     not fix is kept small.
     """
     x, y = offset[..., 0], offset[..., 1]
-    basis = np.stack([np.ones_like(x), x, y, x * x / 2.0, x * y, y * y / 2.0], axis=-1)
+    basis = np.stack([np.ones_like(x), x, y, x * x / 2.0, x * y, y * y / 2.0], axis=1)
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
-    weighted = basis * weight[..., None]
-    normal = np.einsum("mki,mkj->mij", weighted, basis)
+    weighted = basis * weight[:, None]
+    normal = weighted @ basis.transpose(0, 2, 1)
     normal += np.diag([1e-9, 1e-5, 1e-5, 3e-3, 3e-3, 3e-3])
-    return np.linalg.solve(normal, np.einsum("mki,mkc->mic", weighted, values))
+    return np.linalg.solve(normal, weighted @ values)

@@ -16,6 +16,7 @@ from nrdf.regions.region import ON_REFERENCE
 from nrdf.units import in_words
 
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
+_FACING = 0.1  # cosine above which a side faces a tool: the side round a square corner does not
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def feet_under(
     so that a tool near a thin part's edge stays on its side.
     """
     near = surface.tree.query(positions, np.arange(1, min(32, len(surface.points)) + 1))[1]
-    facing = np.einsum("mka,ma->mk", surface.normals[near], axes) > 0.0
+    facing = np.einsum("mka,ma->mk", surface.normals[near], axes) > _FACING
     # The first that faces the tool, or the nearest of all.
     first = near[np.arange(len(near)), facing.argmax(axis=1)]
     start, normals = surface.points[first], surface.normals[first]
