@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from nrdf.benchmark import presence
 from nrdf.benchmark.scans import RegionFigure
 from nrdf.errors import DataError
+from nrdf.regions.presence import ABSENT
 
 
 def region(pair: int, state: str, evidence: tuple[float, float], kind: str = "3 views"):
@@ -38,10 +41,12 @@ def test_canonical_clouds_do_not_count():
 
 
 def test_rules_are_judged_on_pairs_that_they_were_not_fitted_on():
-    rows = {(kind, what): (n, of) for kind, what, n, of in presence.cross_validate(regions())}
-    assert rows["3 views", "absent, told"] == (15, 15)
-    assert rows["3 views", "there, taken for absent"] == (0, 30)
-    assert rows["full", "absent, told"] == (0, 0)
+    figures = regions()
+    figures[0] = replace(figures[0], reason=ABSENT)
+    rows = {row[:2]: row[2:] for row in presence.cross_validate(figures)}
+    assert rows["3 views", "absent"] == (1, 15, 15)
+    assert rows["3 views", "there"] == (0, 0, 30)
+    assert rows["full", "absent"] == (0, 0, 0)
 
 
 def test_without_absent_regions_there_is_nothing_to_fit():
@@ -57,6 +62,7 @@ def test_pairs_that_were_measured_are_kept(tmp_path, monkeypatch):
         return [region(pair, "absent", (1.0, float("nan")))]
 
     monkeypatch.setattr(presence, "score_regions", score)
+    monkeypatch.setattr(presence, "choose_pairs", lambda category, count: list(range(count)))
     shown = []
     first = presence.collect(lambda: "judge", "chair", 2, tmp_path, lambda *n: shown.append(n))
     again = presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
@@ -66,3 +72,9 @@ def test_pairs_that_were_measured_are_kept(tmp_path, monkeypatch):
     (tmp_path / "chair-001.json").write_text("[{")
     with pytest.raises(DataError, match=r"chair-001\.json is damaged .* delete it"):
         presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
+
+
+def test_pairs_whose_target_lacks_regions_come_first():
+    assert presence.choose_pairs("car", 2) == [0, 1], "no car lacks anything"
+    chosen = presence.choose_pairs("chair", 2)
+    assert chosen == sorted(chosen) and set(chosen) <= set(range(10)) and chosen != [0, 1]

@@ -17,13 +17,12 @@ from scipy.optimize import minimize
 from nrdf.benchmark.scans import KINDS, RegionFigure, score_regions
 from nrdf.errors import DataError, OutputError
 from nrdf.ply import write_atomically
+from nrdf.regions.presence import ABSENT
 from nrdf.scans.judge import Judge
 from nrdf.shapes.families import get_family
 
 FIRST_SEED = 1_000_000
 """Of the members that are fitted on."""
-ABSENT_WEIGHT = 3.0
-"""An absent region counts as much as so many that are there: there are few of them."""
 _CHOICE = 5
 _FOLDS = 5
 _RIDGE = 1e-2  # keeps the regression finite where the evidence separates all
@@ -98,36 +97,36 @@ def fit(figures: Sequence[RegionFigure]) -> Rule:
             f"{absent.sum()} absent regions among {len(absent)}: both kinds are needed to tell "
             "them apart; measure more pairs, or a category whose members lack parts"
         )
-    weight = np.where(absent, ABSENT_WEIGHT, 1.0)
     sign = np.where(absent, 1.0, -1.0)
     columns = np.column_stack([np.ones(len(evidence)), evidence])
 
     def loss(rule: np.ndarray) -> float:
-        return float(weight @ np.logaddexp(0, -sign * (columns @ rule)) + _RIDGE * rule @ rule)
+        return float(np.logaddexp(0, -sign * (columns @ rule)).sum() + _RIDGE * rule @ rule)
 
     bias, *weights = minimize(loss, np.zeros(columns.shape[1])).x
     return Rule(float(bias), tuple(float(w) for w in weights))
 
 
-def cross_validate(figures: Sequence[RegionFigure]) -> list[tuple[str, str, int, int]]:
-    """Rows (kind, what, how many, of how many) of rules that were fitted on other pairs.
+def cross_validate(figures: Sequence[RegionFigure]) -> list[tuple[str, str, int, int, int]]:
+    """Rows: kind, what, how many are told absent by the rule in use, how many by rules that were
+    fitted on other pairs, of how many.
 
-    Counted are absent regions that are told, and regions that are there and taken for absent.
+    Counted are regions that are absent, and regions that are there.
     """
-    counts: dict[tuple[str, str], np.ndarray] = {}
-    for fold in range(_FOLDS):
-        others = [f for f in figures if f.pair % _FOLDS != fold]
-        mine = [f for f in figures if f.pair % _FOLDS == fold]
-        if not mine:
-            continue
-        rule = fit(others)
-        for kind in KINDS:
-            for state, what in (("absent", "absent, told"), ("there", "there, taken for absent")):
-                rows = [f.evidence for f in mine if f.kind == kind and f.state == state]
-                found = rule.absent(np.array(rows).reshape(len(rows), -1)) if rows else np.empty(0)
-                row = counts.setdefault((kind, what), np.zeros(2, int))
-                row += int(found.sum()), len(rows)
-    return [(kind, what, int(n), int(of)) for (kind, what), (n, of) in counts.items()]
+    refitted = np.zeros(len(figures), bool)
+    fold = np.array([figure.pair % _FOLDS for figure in figures])
+    for number in np.unique(fold):
+        rule = fit([f for f, its in zip(figures, fold.tolist(), strict=True) if its != number])
+        mine = np.flatnonzero(fold == number).tolist()
+        refitted[mine] = rule.absent(np.array([figures[i].evidence for i in mine]))
+    in_use = np.array([figure.reason == ABSENT for figure in figures])
+    rows = []
+    for kind in KINDS:
+        for state in ("absent", "there"):
+            chosen = np.array([f.kind == kind and f.state == state for f in figures])
+            told = int(in_use[chosen].sum()), int(refitted[chosen].sum())
+            rows.append((kind, state, told[0], told[1], int(chosen.sum())))
+    return rows
 
 
 def _table(figures: Sequence[RegionFigure]) -> tuple[np.ndarray, np.ndarray]:

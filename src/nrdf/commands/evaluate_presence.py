@@ -21,9 +21,9 @@ def presence(
     """Fit what tells absent regions, on scans of family members.
 
     Regions of pairs of members that no training has seen are sought whole and in simulated scans;
-    a logistic regression tells those that the target lacks. Shows its coefficients, which stand in
-    nrdf/regions/presence.py, and how well rules do on pairs that they were not fitted on. Started
-    again, it goes on where it was.
+    a logistic regression tells those that the target lacks. Shows its coefficients, to be compared
+    with those in nrdf/regions/presence.py, and what is told by the rule in use, and by rules that
+    were fitted on other pairs. Started again, it goes on where it was.
 
     Example: nrdf eval presence --pairs 25 --out runs/presence
 
@@ -44,9 +44,9 @@ def presence(
     rule = fit(every)
     weights = ", ".join(f"{weight:.2f}" for weight in rule.weights)
     console.print(f"bias {rule.bias:.2f}; weights of existence and distance: {weights}")
-    shown = table("", "on other pairs", "", "regions", "of")
-    for kind, what, count, of in cross_validate(every):
-        shown.add_row(kind, what, str(count), str(of))
+    shown = table("", "told absent", "", "as in use", "fitted on other pairs", "of")
+    for kind, state, in_use, refitted, of in cross_validate(every):
+        shown.add_row(kind, state, str(in_use), str(refitted), str(of))
     show(shown)
 
 

@@ -23,15 +23,16 @@ from nrdf.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis,
 WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that are judged by
 _YAWS = 36  # that are tried at first
-_REFINED = 3  # of them that are refined, by the field's judgement
-_FACING = 2  # likewise, by the network's
+_REFINED = 4  # of them that are refined, by the field's judgement alone
+_REFINED_FACING = 3, 2  # by the field's, and by the network's where there is one
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
-# Chosen on single views of family and test shapes: of the poses that are wrong, nine in ten are
-# reported as ambiguous, of those that are right two in ten.
-_COST_SCALE = 0.036  # difference of cost that makes a pose e times less likely
-# Chosen on 84 scans of family members and training meshes that the network was not trained on.
+# Differences of cost that make a pose e times less likely. The field's alone was chosen on single
+# views of family members and public meshes: nine in ten wrong poses are reported as ambiguous, and
+# two in ten right ones. The other, and what the network counts for, were chosen on 84 scans (half
+# of them single views) of cars that the network was not trained on: no right pose is ambiguous.
+_COST_SCALE, _COST_SCALE_FACING = 0.036, 0.1
 _FACING_COST = 0.1  # of what the network finds e times less likely than what it likes best
 _MOST_AGAINST = 3.0  # of those logarithms: the field can object, and then the pose is ambiguous
 SURE = 0.8
@@ -145,15 +146,18 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
     costs = judge.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
     facing = _facing(judge, working, ups)
-    by_facing = -np.array([at_yaws(row, yaws) for row in facing])
-    best = np.concatenate([_minima(costs, _REFINED), _minima(by_facing, _FACING)])
+    best = _minima(costs, _REFINED)
+    if judge.yaw is not None:
+        against = -np.array([at_yaws(row, yaws) for row in facing])
+        by_field, by_network = _REFINED_FACING
+        best = np.unique([*best[:by_field], *_minima(against, by_network)])
     lap("facing")
-    refined = [found for index in np.unique(best) for found in _refine(working, tried[index])]
+    refined = [found for index in best for found in _refine(working, tried[index])]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
-    by_field = judge.fine(points, normals, *_completed(points, normals, refined))
-    costs = by_field + _FACING_COST * _against(facing, ups, refined)
+    field_costs = judge.fine(points, normals, *_completed(points, normals, refined))
+    costs = field_costs + _FACING_COST * _against(facing, ups, refined)
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
         found = refined[index]
@@ -161,10 +165,11 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
             pose = found.frame(working.points).then(working.to_scan)
             symmetry = found.plane.agreement if found.plane is not None else 0.0
             yaw = float(np.arctan2(np.sin(found.yaw), np.cos(found.yaw)))
-            cost, alone = float(costs[index]), float(by_field[index])
+            cost, alone = float(costs[index]), float(field_costs[index])
             candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
     lap("fine")
-    weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / _COST_SCALE)
+    scale = _COST_SCALE if judge.yaw is None else _COST_SCALE_FACING
+    weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / scale)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
 
