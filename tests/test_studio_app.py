@@ -138,3 +138,21 @@ def test_several_targets_stand_side_by_side(page):
     assert all(a.min() > b.max() for a, b in pairwise(spans)), "none overlap"
     page.does(page.studio.panel.targets._show, "rocker")
     assert page.studio.shown() == [REFERENCE, "rocker"]
+
+
+def test_likeness_follows_the_place_that_is_pointed_at(page):
+    studio = page.studio
+    page.bring()
+    assert "point at the reference" in page.does(studio.compare, "new", 3)
+    page.does(studio.compare, REFERENCE, 3)
+    first = studio.likeness("new")
+    assert studio.colouring == "likeness" and studio.likeness(REFERENCE).argmin() == 3
+    with studio.answering():
+        studio.compare(REFERENCE, 700)
+    assert not studio.worker.busy, "at once"
+    assert studio.likeness(REFERENCE).argmin() == 700
+    assert (studio.likeness("new") != first).any()
+    page.does(studio.panel.targets._add, "rocker")
+    page.bring()
+    page.does(studio.compare, REFERENCE, 3)
+    assert studio.likeness("rocker") is not None, "what came later too"

@@ -249,6 +249,8 @@ class Studio:
                 work(progress)
             finally:
                 with self.lock:
+                    if kind != "likeness":
+                        self._described = None  # of what there was before
                     self.draw()
                     self.panel.refresh()
 
