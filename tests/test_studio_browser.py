@@ -36,6 +36,7 @@ FLAGS = (
     "--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--no-first-run",
+    "--webgl-antialiasing-mode=none", "--webgl-msaa-sample-count=0",
 )  # fmt: skip
 PATIENCE_S = 60.0
 
@@ -164,7 +165,7 @@ def person(studio):
     SHOTS.mkdir(parents=True, exist_ok=True)
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=list(FLAGS))
-        page = browser.new_page(viewport={"width": 920, "height": 640}, accept_downloads=True)
+        page = browser.new_page(viewport={"width": 820, "height": 560}, accept_downloads=True)
         page.set_default_timeout(1e3 * PATIENCE_S)
         page.goto(f"http://127.0.0.1:{studio.server.get_port()}")
         person = Person(page, studio)
