@@ -39,6 +39,12 @@ FLAGS = (
     "--webgl-antialiasing-mode=none", "--webgl-msaa-sample-count=0",
 )  # fmt: skip
 PATIENCE_S = 60.0
+SELDOM = """
+const draw = window.requestAnimationFrame;
+window.requestAnimationFrame = (frame) => setTimeout(() => draw(frame), 80);
+window.cancelAnimationFrame = (waiting) => clearTimeout(waiting);
+"""
+"""Few frames a second: drawing without a graphics card is most of this test's processor time."""
 
 
 def browser_path() -> str:
@@ -167,6 +173,7 @@ def person(studio):
         browser = playwright.chromium.launch(executable_path=browser_path(), args=list(FLAGS))
         page = browser.new_page(viewport={"width": 820, "height": 560}, accept_downloads=True)
         page.set_default_timeout(1e3 * PATIENCE_S)
+        page.add_init_script(SELDOM)
         page.goto(f"http://127.0.0.1:{studio.server.get_port()}")
         person = Person(page, studio)
         yield person
