@@ -150,8 +150,19 @@ def test_cancelling_ends_the_process(job):  # noqa: F811
 
     with pytest.raises(Cancelled):
         running.drive(cancelled)
+    told, waits = [], threading.Event()
+
+    def wait():
+        with pytest.raises(Cancelled):
+            running.drive(lambda done, total: waits.set())
+        told.append("cancelled")
+
+    waiting = threading.Thread(target=wait)
+    waiting.start()
+    assert waits.wait(10)
     running.end()
-    assert not running._process.is_alive()
+    waiting.join(10)
+    assert not running._process.is_alive() and told == ["cancelled"]
 
 
 def test_without_mujoco_it_says_what_to_install(monkeypatch):

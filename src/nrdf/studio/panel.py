@@ -55,7 +55,7 @@ class Activity:
 
     def __init__(self, gui: viser.GuiApi, cancel: Callable[[], None]) -> None:
         self._what = gui.add_markdown("", visible=False)
-        self._bar: Any = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._bar: Any = gui.add_progress_bar(0.0, visible=False)
         self._cancel = gui.add_button("Cancel", color="gray", visible=False)
         self._cancel.on_click(lambda _: cancel())
         self._since = 0.0

@@ -13,7 +13,7 @@ from nrdf.studio.stage import Figure
 _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the cell's frame, z up, to the stage's directions, y up, the object's x staying x."""
 _MISSED = (215, 20, 20)
-_MISSED_SIZE = 2.6  # of a point that is not reached, in spacings
+_MISSED_SIZE = 1.2  # of a point that is not reached, in spacings
 _ROOM_M = (-0.08, 0.08)  # around the arm's frames, for its thickness
 _EVERY = 25  # moments between those that a camera is placed by
 

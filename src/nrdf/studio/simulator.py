@@ -66,9 +66,10 @@ class Simulator:
         try:
             made: dict[str, Any] = self._wait(progress)
         except Cancelled:
-            self._send(None)
-            with contextlib.suppress(Cancelled):
-                self._wait(lambda done, total: None)
+            if not self._ended:
+                self._send(None)
+                with contextlib.suppress(Cancelled):
+                    self._wait(lambda done, total: None)
             raise
         return made
 
