@@ -66,7 +66,9 @@ class TargetsTab:
         report = report_of(result.transferred, Limits())
         old = "" if studio.bench.is_current(key) else " *(of before your last change)*"
         minutes, seconds = divmod(round(report["total"]["cycle_time_s"]), 60)
-        head = f"**{key}**{old}: {report['total']['paths']} tool paths, {minutes} min {seconds} s"
+        count = report["total"]["paths"]
+        paths = "1 tool path" if count == 1 else f"{count} tool paths"
+        head = f"**{key}**{old}: {paths}, {minutes} min {seconds} s"
         rows = ["| region | process | sure | covered |", "|---|---|---|---|"]
         for path in report["paths"]:
             region = report["regions"][path["region"]]
