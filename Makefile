@@ -39,7 +39,7 @@ $(VENV)/nrdf.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@
 
 $(VENV)/studio.stamp: pyproject.toml constraints.txt | $(BIN)/python
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[studio]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[studio,robot]'
 	@touch $@ $(VENV)/nrdf.stamp
 
 $(VENV)/dev.stamp: pyproject.toml constraints.txt | $(BIN)/python
