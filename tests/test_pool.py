@@ -53,7 +53,9 @@ def pieces():
 @pytest.mark.skipif(os.name != "posix", reason="signals as on Unix")
 def test_ctrl_c_ends_all_processes_and_leaves_no_half_written_file(tmp_path):
     script = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        f"import signal, sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        # Tests that run in a shell's background inherit that Ctrl-C is ignored.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from test_pool import write_slowly\n"
         "from nrdf.shapes.pool import each\n"
         "if __name__ == '__main__':\n"
