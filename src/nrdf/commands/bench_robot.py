@@ -9,13 +9,14 @@ from nrdf.commands.console import console, errors, show, table, versions
 
 def bench_robot(folder: Path, out: Path | None) -> None:
     """Drive the demonstration's chairs, and print figures against their bars."""
-    from nrdf.benchmark.robot import drive, figures
+    from nrdf.benchmark.robot import drive, figures, together
     from nrdf.output import write_json
 
     with errors.status("simulation") as status:
         reports = drive(folder, status.update)
-    shown = table("the demonstration on the bundled arm", "", "bar", *reports)
-    for figure in figures(reports):
+    columns = {**reports, "all": together(reports)}
+    shown = table("the demonstration on the bundled arm", "", "bar", *columns)
+    for figure in figures(columns):
         cells = [
             f"{value:.2f}" + ("" if met else " ✗")
             for value, met in zip(figure.values, figure.met, strict=True)
