@@ -89,8 +89,11 @@ class YawNetwork(nn.Module):
         logits = self(*shown).log_softmax(1).view(_TURNS, 2, clouds, bins)
         # A mirror image faces minus the yaw.
         logits[:, 1] = logits[:, 1].flip(-1).roll(1, -1)
-        turned = [row.roll(-step, -1) for row, step in zip(logits[:, 0], steps, strict=True)]
-        turned += [row.roll(-step, -1) for row, step in zip(logits[:, 1], steps, strict=True)]
+        turned = [
+            row.roll(-step, -1)
+            for side in logits.unbind(1)
+            for row, step in zip(side, steps, strict=True)
+        ]
         return torch.cat(turned).mean(0).log_softmax(0).numpy()
 
 

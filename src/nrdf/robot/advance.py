@@ -71,13 +71,13 @@ def advance(
     return moved, good
 
 
-def leaned(axes: np.ndarray, angle: float) -> np.ndarray:
-    """Axes (b, k, 3) that lean by an angle, rad, from axes (b, 3), to every side."""
+def leaned(axes: np.ndarray, angle: float, ways: int = _LEAN_WAYS) -> np.ndarray:
+    """Axes (b, ways, 3) that lean by an angle, rad, from axes (b, 3), to every side."""
     helper = np.eye(3)[np.abs(axes).argmin(axis=1)]
     one = np.cross(axes, helper)
     one /= np.linalg.norm(one, axis=1, keepdims=True)
     other = np.cross(axes, one)
-    way = np.arange(_LEAN_WAYS) * 2.0 * np.pi / _LEAN_WAYS
+    way = np.arange(ways) * 2.0 * np.pi / ways
     aside = np.cos(way)[:, None] * one[:, None] + np.sin(way)[:, None] * other[:, None]
     return np.asarray(np.cos(angle) * axes[:, None] + np.sin(angle) * aside)
 

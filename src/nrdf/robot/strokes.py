@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nrdf.robot.advance import advance_along
+from nrdf.robot.advance import advance_along, leaned
 from nrdf.robot.cell import Cell
 from nrdf.robot.inverse import LEAST_CLEARANCE_M, solve
 from nrdf.robot.lines import Line
@@ -21,13 +21,11 @@ _ASLANT_RAD, _ASLANT_WAYS = np.radians(45.0), 6
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """A line, or a piece of it, as the arm drives it at one turn of the object.
+class Piece:
+    """A line, or a piece of it, that the arm can follow at one turn of the object.
 
     line: index of it; first, last: of its waypoints, inclusive. axes: (m, 3) of the tool there, in
-    the object's frame, the planned ones unless it leans; joints: (m, n). way: (k, n) joints along
-    the line, with places between the waypoints; at: (k,) the waypoint each is at, a number between
-    0 and m - 1. lead_in (j, n), lead_out (j, n): on the ways to and from.
+    the object's frame, the planned ones unless it leans; joints: (m, n).
     """
 
     line: int
@@ -36,6 +34,16 @@ class Stroke:
     turn: int
     axes: np.ndarray
     joints: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stroke(Piece):
+    """A piece as the arm drives it, with its ways to and from the surface.
+
+    way: (k, n) joints along the line, with places between the waypoints; at: (k,) the waypoint each
+    is at, a number between 0 and m - 1. lead_in (j, n), lead_out (j, n): on the ways to and from.
+    """
+
     way: np.ndarray
     at: np.ndarray
     lead_in: np.ndarray
@@ -53,18 +61,6 @@ class Stroke:
             lead_in=self.lead_in + shift,
             lead_out=self.lead_out + shift,
         )
-
-
-@dataclass(frozen=True)
-class Piece:
-    """A stroke before its ways to and from are known; fields as there."""
-
-    line: int
-    first: int
-    last: int
-    turn: int
-    axes: np.ndarray
-    joints: np.ndarray
 
 
 def between(
@@ -172,12 +168,7 @@ def _lead(line: Line, waypoint: int, begins: bool, axis: np.ndarray, attempt: in
         return into[::-1] if begins else out
     away = -axis
     if attempt > 1:
-        helper = np.eye(3)[int(np.abs(axis).argmin())]
-        one = np.cross(axis, helper)
-        one /= np.linalg.norm(one)
-        angle = 2.0 * np.pi * (attempt - 2) / _ASLANT_WAYS
-        aside = np.cos(angle) * one + np.sin(angle) * np.cross(axis, one)
-        away = np.cos(_ASLANT_RAD) * away + np.sin(_ASLANT_RAD) * aside
+        away = leaned(axis[None], np.pi - _ASLANT_RAD, _ASLANT_WAYS)[0, attempt - 2]
     return line.straight_away(waypoint, away)
 
 

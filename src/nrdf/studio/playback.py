@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,7 @@ class Playback:
 def playback_of(simulated: Simulated) -> Playback:
     """A simulation as it can be shown."""
     shapes: list[Shape] = _standing(simulated)
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in _TIMELINE}
+    parts: dict[str, list[np.ndarray]] = defaultdict(list)
     clock, turn = 0.0, None
     for number, driven in enumerate(simulated.paths):
         model = specification(driven.cell).compile()
@@ -114,11 +115,6 @@ def playback_of(simulated: Simulated) -> Playback:
         missed=np.concatenate([_missed(driven) for driven in simulated.paths]),
         report=report_of(simulated),
     )
-
-
-_TIMELINE = (
-    "times", "path", "doing", "line", "force_n", "turn_rad", "positions", "quaternions_wxyz",
-)  # fmt: skip
 
 
 class _Mover:

@@ -183,7 +183,7 @@ def draw(
     # The floor takes the lowest with it, and now and then an end is missing.
     height = points[..., 1] - points[..., 1].amin(1, keepdim=True)
     slab = 0.03 * uniform(b, 1) * (uniform(b, 1) < 0.7)
-    away = torch.nn.functional.normalize(torch.randn(b, 1, 3, generator=generator), dim=-1)
+    away = functional.normalize(torch.randn(b, 1, 3, generator=generator), dim=-1)
     along = (points * away).sum(-1)
     limit = along.masked_fill(~seen, math.nan).nanquantile(0.75, dim=1, keepdim=True)
     whole = (along < limit) | (uniform(b, 1) < 0.85)
