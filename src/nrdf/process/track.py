@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -148,13 +148,14 @@ def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Nei
         if len(mine):
             travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
             asking = owner[mine] == number
-            near = _beside(patch, track, mine, uv[mine], travel, asking, stepover)
-            found.append(replace(near, patch=np.full(len(near.place), number)))
+            near = _beside(patch, number, track, mine, uv[mine], travel, asking, stepover)
+            found.append(near)
     return Neighbours.joined(found)
 
 
 def _beside(
     patch: Patch,
+    number: int,
     track: Track,
     mine: np.ndarray,
     place: np.ndarray,
@@ -164,7 +165,7 @@ def _beside(
 ) -> Neighbours:
     """`line_spacing` in one patch, from those of its places that are `asking` (n,).
 
-    mine: (n,) of the track's places; place, travel: (n, 2), in the patch's plane.
+    number: the patch's. mine: (n,) of the track's places; place, travel: (n, 2), in its plane.
     """
     reach, walked = 2.5 * stepover, track.walked[mine]
     tree = cKDTree(place)
@@ -200,7 +201,7 @@ def _beside(
     nearest = tree.query(middle)[0] / np.maximum(np.linalg.norm(crossing, axis=1), 1e-12)
     arc = chord / np.sinc(half / np.pi)
     distance = arc * np.minimum(1.0, 2.0 * nearest)
-    return Neighbours(mine[i], beside, distance, np.zeros(len(i), int), middle)
+    return Neighbours(mine[i], beside, distance, np.full(len(i), number), middle)
 
 
 def _placed(
