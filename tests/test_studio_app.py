@@ -156,3 +156,23 @@ def test_likeness_follows_the_place_that_is_pointed_at(page):
     page.bring()
     page.does(studio.compare, REFERENCE, 3)
     assert studio.likeness("rocker") is not None, "what came later too"
+
+
+def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
+    """Taking callbacks away would end the drag that is under way, and turn the camera."""
+    taken_away = []
+    ground = page.studio.stage.figures[REFERENCE].ground
+    take_away = type(ground).remove_drag_callback
+
+    def remove_drag_callback(handle, *words):
+        taken_away.append(handle)
+        take_away(handle, *words)
+
+    monkeypatch.setattr(type(ground), "remove_drag_callback", remove_drag_callback)
+    page.does(page.studio.mouse.take, "Brush")
+    assert ground.visible
+    page.does(page.studio.sync)
+    page.does(page.studio.mouse.take, "Arrow")
+    assert not taken_away
+    page.does(page.studio.mouse.take, "Turn")
+    assert ground in taken_away and not ground.visible

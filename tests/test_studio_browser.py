@@ -82,6 +82,11 @@ class Person:
     def press(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).last.click()
 
+    def take(self, tool: str) -> None:
+        """Another tool; the page says when it is in the hand."""
+        self.press(tool)
+        self.reads(f"In your hand: {tool}")
+
     def field(self, label: str):
         shown = "input[not(@type='hidden')]"
         return self.page.locator(
@@ -130,7 +135,7 @@ class Person:
         self._until_done(drag, done, f"dragging on {key}")
 
     def _until_done(self, act, done, what: str) -> None:
-        """Do it again: a busy browser may miss what the mouse does, or do it with the old tool."""
+        """Do it again: a busy browser may miss what the mouse does."""
         for _ in range(5):
             act()
             end = time.monotonic() + 0.2 * PATIENCE_S
@@ -229,7 +234,7 @@ def test_all_steps(person, studio, tmp_path):
     until(lambda: studio.radius_m == 0.12, "the radius")
     person.click_on(REFERENCE, back, lambda: desk.document.region("back").mask.any())
     assert truth["back-front"][desk.document.region("back").mask].mean() > 0.9, "it went through"
-    person.press("Brush")
+    person.take("Brush")
 
     def size() -> int:
         return int(desk.document.region("back").mask.sum())
@@ -256,7 +261,7 @@ def test_all_steps(person, studio, tmp_path):
     person.reads("-0.005")
     person.write("Speed, mm/s", "80")
     person.choose("Region", "seat")
-    person.press("Arrow")
+    person.take("Arrow")
     behind = desk.body(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
     behind = int(np.argmin(np.linalg.norm(desk.body(REFERENCE).points - behind, axis=1)))
 
@@ -280,14 +285,14 @@ def test_all_steps(person, studio, tmp_path):
     assert all(step.path is not None for step in found.paths)
     person.reads("2 tool paths")
     person.shoot("target")
-    person.press("Alike")
+    person.take("Alike")
     person.click_on(REFERENCE, seat, lambda: studio.colouring == "likeness")
     before = studio.likeness("ladder-back")
     person.drag_on(REFERENCE, seat, back, lambda: (studio.likeness("ladder-back") != before).any())
     sync_api.expect(person.field("Colours")).to_have_value("likeness")
     time.sleep(1.0)  # for the picture alone
     person.shoot("likeness")
-    person.press("Grow")
+    person.take("Grow")
     there = middle_of("ladder-back", "seat")
     person.click_on("ladder-back", there, lambda: desk.target("ladder-back").corrected)
     until(lambda: studio.bench.is_current("ladder-back"), "the new tool path")

@@ -40,6 +40,7 @@ class Mouse:
         self.tool, self.erase, self.through = TOOLS[0], False, False
         self._grown: _Grown | None = None
         self._drag: tuple[Figure, int] | None = None
+        self._boxes = False
         studio.server.scene.on_click()(self._clicked)
 
     def take(self, tool: str) -> None:
@@ -53,17 +54,20 @@ class Mouse:
         self._grown = self._drag = None
 
     def grip(self) -> None:
-        """Let drags go to the tool that needs them, and to the camera otherwise."""
+        """Let drags go to the tool that needs them, and to the camera otherwise.
+
+        What holds already is left alone: taking it away ends the drag that goes on.
+        """
         scene = self.studio.server.scene
-        scene.remove_rect_select_callback()
-        if self.tool == "Box":
-            scene.on_rect_select()(self._boxed)
-        drags = self.tool in ("Brush", "Arrow", "Alike")
+        boxes, drags = self.tool == "Box", self.tool in ("Brush", "Arrow", "Alike")
+        if boxes != self._boxes:
+            self._boxes = boxes
+            if boxes:
+                scene.on_rect_select()(self._boxed)
+            else:
+                scene.remove_rect_select_callback()
         for figure in self.studio.stage.figures.values():
-            figure.ground.remove_drag_callback()
-            figure.ground.visible = drags
-            if drags:
-                figure.ground.on_drag(self._dragged)
+            figure.let_drag(self._dragged if drags else None)
 
     def regrow(self, radius_m: float) -> None:
         """Another radius, also for the patch that was grown last."""

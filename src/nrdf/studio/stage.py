@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 import viser
@@ -94,6 +95,16 @@ class Figure:
         facing = 0.5 + 0.5 * self.body.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
         shade = _DARKEST + (1 - _DARKEST) * facing
         self.points.colors = (colours * shade[:, None]).astype(np.uint8)
+
+    def let_drag(self, dragged: Callable[..., Any] | None) -> None:
+        """Who is told of drags that begin on the object; the camera, where None is."""
+        if (dragged is not None) == self.ground.visible:
+            return
+        self.ground.visible = dragged is not None
+        if dragged is None:
+            self.ground.remove_drag_callback()
+        else:
+            self.ground.on_drag(dragged)
 
     def name(self, text: str) -> None:
         """What stands above the object."""
