@@ -38,6 +38,7 @@ def faces(of):
 
 
 MEASURES = Measures(
+    left_out=0.0,
     coverage=0.995,
     overlap=0.4,
     line_spacing_mean_m=0.04,

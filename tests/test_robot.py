@@ -7,17 +7,19 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 # Not by importing it: nrdf must be first, to choose what MuJoCo draws with.
 if find_spec("mujoco") is None:
     pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
 from nrdf.errors import ProcessError, RobotError
+from nrdf.process.frames import surface_frames
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.robot.arm import BUNDLED, load_arm
 from nrdf.robot.cell import Cell, Placement
 from nrdf.robot.inverse import Library, errors, solve
-from nrdf.robot.solid import solid_from_points
+from nrdf.robot.solid import _without_specks, solid_from_points
 from nrdf.robot.spheres import cover_box, cover_capsule, cover_cylinder
 from nrdf.robot.timing import STEP_S, timed
 from nrdf.robot.tool import tool_of
@@ -210,22 +212,14 @@ def test_a_folder_that_is_no_whole_job(tmp_path):
         read_work(tmp_path)
 
 
-@pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    """A plate of 0.3 m with one region, in its folder."""
+def write_job_on(folder, points, normals, region, segments):
+    """A job on an object (n, 3), (n, 3) whose first points, so many, are the region 'top'."""
     import nrdf
     from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
     from nrdf.process.knowledge_file import write_knowledge
     from nrdf.process.toolpath import Job, write_job
 
-    folder = tmp_path_factory.mktemp("job")
-    rng = np.random.default_rng(0)
-    flat = rng.uniform(-0.15, 0.15, (2500, 2))
-    top = np.stack([flat[:, 0], np.full(2500, 0.42), flat[:, 1]], axis=1)
-    below = top - [0.0, 0.03, 0.0]
-    up = np.tile([0.0, 1.0, 0.0], (2500, 1))
-    cloud = nrdf.PointCloud(np.concatenate([top, below]), np.concatenate([up, -up]), unit="m")
-    nrdf.write_cloud(folder / "target.ply", cloud)
+    nrdf.write_cloud(folder / "target.ply", nrdf.PointCloud(points, normals, unit="m"))
     process = Process(
         kind="sand",
         stepover_m=0.03,
@@ -233,19 +227,31 @@ def job(tmp_path_factory):
         force_n=10.0,
         tool=Tool(name="disc", radius_m=0.025),
     )
-    region = Region(name="top", indices=list(range(2500)), processes=[process])
+    region = Region(name="top", indices=list(range(region)), processes=[process])
     knowledge = Knowledge(
         category="chair", reference=Reference(cloud="target.ply"), regions=[region]
     )
     write_knowledge(folder / "knowledge.yaml", knowledge)
+    path = ToolPath("top", "sand", "disc", 0.025, tuple(segments))
+    write_job(folder, Job("chair", "target", (path,)))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    """A plate of 0.3 m with one region, in its folder."""
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-0.15, 0.15, (2500, 2))
+    top = np.stack([flat[:, 0], np.full(2500, 0.42), flat[:, 1]], axis=1)
+    below = top - [0.0, 0.03, 0.0]
+    up = np.tile([0.0, 1.0, 0.0], (2500, 1))
     turned = np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (9, 1))
     segments = []
     for number, z in enumerate((-0.05, 0.0, 0.05)):
         line = np.stack([np.linspace(-0.1, 0.1, 9), np.full(9, 0.42), np.full(9, z)], axis=1)
         segments.append(Segment("process", number, line, turned, 0.1, 10.0))
-    path = ToolPath("top", "sand", "disc", 0.025, tuple(segments))
-    write_job(folder, Job("chair", "target", (path,)))
-    return folder
+    whole = np.concatenate([top, below]), np.concatenate([up, -up])
+    return write_job_on(tmp_path_factory.mktemp("job"), *whole, 2500, segments)
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.0, 0.005, 0.0), (0.0, -0.005, 0.0)])
@@ -259,6 +265,35 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
     assert out.force_within is not None and out.force_within > 0.95
     assert out.coverage_achieved == pytest.approx(out.coverage_planned, abs=0.03)
     assert not done.paths[0].collisions
+
+
+def test_force_is_kept_over_a_bend_that_few_waypoints_tell(arm, tmp_path):
+    """Between waypoints 40 degrees apart the way is straight, 3 mm below a roller's skin."""
+    from nrdf.robot.simulate import read_work, simulate
+
+    rng = np.random.default_rng(0)
+    turn, z = rng.uniform(0.0, 2.0 * np.pi, 6000), rng.uniform(-0.15, 0.15, 6000)
+    out = np.stack([np.sin(turn), np.cos(turn), 0.0 * z], axis=1)
+    points = 0.05 * out + np.stack([0.0 * z, np.full(6000, 0.4), z], axis=1)
+    order = np.argsort(-out[:, 1])
+    at = np.radians([-60.0, -20.0, 20.0, 60.0])
+    outward = np.stack([np.sin(at), np.cos(at), 0.0 * at], axis=1)
+    held = Rotation.from_matrix(surface_frames(np.cross(outward, [0.0, 0.0, -1.0]), outward))
+    line = 0.05 * outward + [0.0, 0.4, 0.0]
+    segments = [Segment("process", 0, line, held.as_quat(), 0.04, 10.0)]
+    folder = write_job_on(tmp_path, points[order], out[order], 2000, segments)
+    done = simulate(read_work(folder), arm, placement=Placement((0.75, 0, 0.3), np.pi, 0.3, (0.0,)))
+    assert done.paths[0].outcome.reached == 4
+    assert done.paths[0].outcome.force_within > 0.95
+
+
+def test_single_nodes_on_the_wrong_side_are_no_part_of_a_solid():
+    value = np.zeros((12, 12, 12))
+    value[2:9, 2:9, 2:9] = 1.0
+    wrong = value.copy()
+    wrong[10, 10, 10], wrong[5, 5, 5] = 1.0, 0.0
+    wrong[0, 0, :2] = 0.9
+    np.testing.assert_array_equal(_without_specks(wrong), value)
 
 
 def test_a_robot_that_reaches_nothing(job, arm):

@@ -12,6 +12,7 @@ from nrdf.errors import ProcessError
 from nrdf.process.frames import lean_rotation, surface_frames, travel_of
 from nrdf.process.patch import inside_margin, patches_of
 from nrdf.process.plan import Strategy
+from nrdf.process.room import with_room
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
 from nrdf.process.track import Track, line_spacing
@@ -21,7 +22,8 @@ from nrdf.process.track import Track, line_spacing
 class Measures:
     """Figures of one tool path on one region.
 
-    coverage: share [0, 1] of the region's area inside its margin that the footprint reaches;
+    left_out: share [0, 1] of the region that has no room for the tool, and is no part of what
+    follows. coverage: share of the region's area inside its margin that the footprint reaches;
     overlap: share of what is reached that it reaches more than once in a pass;
     line_spacing_*: between neighbouring lines, along the surface; None where no line has a
     neighbour. surface_distance_*: of the process waypoints from the local smooth surface at the
@@ -31,6 +33,7 @@ class Measures:
     given, dwells included.
     """
 
+    left_out: float
     coverage: float
     overlap: float
     line_spacing_mean_m: float | None
@@ -54,6 +57,8 @@ def measure(
     work = [segment for segment in segments if segment.kind == "process"]
     if not work:
         raise ProcessError("a tool path without a process segment cannot be measured")
+    whole = len(surface.indices(region))
+    region = with_room(surface, region, strategy.clearance_m)
     patches = patches_of(surface, region)
     axes = [_axes(segment) for segment in work]
     contacts = [
@@ -69,6 +74,7 @@ def measure(
     off, wrong = _fit(surface, strategy, work, contacts)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
     return Measures(
+        left_out=1.0 - len(surface.indices(region)) / whole,
         coverage=float((visits > 0).mean()) if len(visits) else 0.0,
         overlap=float((visits[visits > 0] > 1).mean()) if (visits > 0).any() else 0.0,
         line_spacing_mean_m=float(spacing.mean()) if len(spacing) else None,

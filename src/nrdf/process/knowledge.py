@@ -49,6 +49,9 @@ class Tool(Quantities):
     """Its name, for the robot's program."""
     radius_m: Positive
     """Radius of its footprint on the surface."""
+    clearance_m: NotNegative = 0.0
+    """Free room that it needs before the surface, along the normal; a strategy leaves out places
+    that have less, such as crevices. 0: not looked at."""
     tcp_m: Vector | None = None
     """Tool centre point in the robot's flange frame."""
     tcp_quaternion_xyzw: Quaternion | None = None

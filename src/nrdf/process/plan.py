@@ -16,6 +16,7 @@ from nrdf.process.frames import lean_rotation, steady, surface_frames, travel_of
 from nrdf.process.lines import Line, nearest_first, on_surface
 from nrdf.process.patch import Patch, inside_margin, patches_of
 from nrdf.process.raster import Stroke, raster
+from nrdf.process.room import with_room
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment
 from nrdf.process.touch_up import fill_gaps, touch_up
@@ -36,6 +37,7 @@ class Strategy:
     surface; None for the region's longest extent. stepover_m: between neighbouring lines, along
     the surface; spacing_m: between waypoints, about; edge_margin_m: waypoints keep that far inside
     the region's border, and the footprint may reach over; tool_radius_m: of the footprint.
+    clearance_m: that much must be free before the surface, along its normal, where it is worked.
     lead_rad: leans the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
     the normal. standoff_m: from the tool centre point to the surface along the tool's axis.
     passes: the lines are driven that often, back and forth. Approach and retract: length of the
@@ -49,6 +51,7 @@ class Strategy:
     spacing_m: float = 0.01
     edge_margin_m: float = 0.0
     tool_radius_m: float = 0.025
+    clearance_m: float = 0.0
     lead_rad: float = 0.0
     tilt_rad: float = 0.0
     standoff_m: float = 0.0
@@ -70,8 +73,8 @@ class Strategy:
         for name in (*above, "retract_feed_m_s", "passes"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ProcessError(f"{name} is {getattr(self, name)}; give a value above 0")
-        lengths = ("edge_margin_m", "standoff_m", "approach_distance_m", "retract_distance_m")
-        for name in (*lengths, "dwell_s"):
+        lengths = ("edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m")
+        for name in (*lengths, "retract_distance_m", "dwell_s"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ProcessError(f"{name} is {getattr(self, name)}; give 0 or more")
         if self.direction is not None:
@@ -86,9 +89,11 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     The region is cut into patches that lie flat without folds (`nrdf.process.patch`), and each into
     lines; what those leave out nearby has short lines of its own. Every line has its approach,
     process and departure segments; an approach or retract distance of 0 leaves its segments out.
-    Raises ProcessError for a margin that leaves nothing of the region, a stepover wider than it, or
-    a direction that stands on it.
+    Places without room for the tool (`nrdf.process.room`) are left out like holes. Raises
+    ProcessError for a margin or clearance that leaves nothing of the region, a stepover wider than
+    it, or a direction that stands on it.
     """
+    region = with_room(surface, region, strategy.clearance_m)
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
     lines: list[Line] = []

@@ -117,6 +117,12 @@ def _asked(process: Process) -> dict[str, Any]:
 def measure_warnings(process: Process, measures: Measures) -> list[str]:
     """What a person should look at before a path is driven."""
     lines = []
+    if measures.left_out > 0.0:
+        room = in_words("clearance_m", process.tool.clearance_m)
+        lines.append(
+            f"{measures.left_out:.1%} of the region has less than {room} free before it, and is "
+            "left out"
+        )
     if measures.coverage < _LEAST_COVERAGE:
         lines.append(
             f"the tool does not reach {1 - measures.coverage:.1%} of the region inside its margin"

@@ -25,6 +25,7 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         spacing_m=process.spacing_m,
         edge_margin_m=process.edge_margin_m,
         tool_radius_m=process.tool.radius_m,
+        clearance_m=process.tool.clearance_m,
         lead_rad=process.lead_rad,
         tilt_rad=process.tilt_rad,
         standoff_m=process.standoff_m,

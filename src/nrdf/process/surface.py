@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry import thin
+from nrdf.winding import Winding
 
 if TYPE_CHECKING:
     from nrdf.process.patch import Patch
@@ -30,7 +31,8 @@ class Surface:
     """An object's cloud with outward normals, as a surface to work on.
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
-    part are told apart by their normals alone. Raises ProcessError if the two do not fit each
+    part are told apart by their normals alone. kept: (n,) indices of the points in the cloud as
+    given, which is thinned where it has very many. Raises ProcessError if the two do not fit each
     other, are not finite, or are fewer than 8.
     """
 
@@ -46,9 +48,9 @@ class Surface:
                 f"a surface needs at least 8 finite points with normals, not {len(points)}"
             )
         self.size = len(points)
-        self._kept = thin(points, MOST_POINTS, np.random.default_rng(0))
-        self.points = points[self._kept]
-        self.normals = unit(normals[self._kept])
+        self.kept = thin(points, MOST_POINTS, np.random.default_rng(0))
+        self.points = points[self.kept]
+        self.normals = unit(normals[self.kept])
         self.patches: dict[bytes, tuple[Patch, ...]] = {}
 
     def indices(self, region: np.ndarray) -> np.ndarray:
@@ -66,11 +68,15 @@ class Surface:
             )
         mask = np.zeros(self.size, bool)
         mask[region] = True
-        return np.flatnonzero(mask[self._kept])
+        return np.flatnonzero(mask[self.kept])
 
     @cached_property
     def tree(self) -> cKDTree:
         return cKDTree(self.points)
+
+    @cached_property
+    def winding(self) -> Winding:
+        return Winding(self.points, self.normals, self.tree)
 
     @cached_property
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,9 @@ The arm is MuJoCo's, with its inertia, motors and force sensor. The surface push
 soft pad as a spring and damper along the tool's axis, with friction against the travel, where the
 object's smooth surface really is: a shifted object is met where it has been shifted to. The
 controller is an admittance: it moves the tool along its axis at a speed in proportion to the error
-of the force that the sensor measures (Siciliano et al., Robotics, 2009, chapter 9).
+of the force that the sensor measures (Siciliano et al., Robotics, 2009, chapter 9). How far the pad
+reaches between waypoints and over bends is known from the scan, and fed forward; where the object
+is not where it was scanned, that is wrong, and the force alone tells.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ SETTLED_SHARE, SETTLES_S = 0.1, 1.5
 _RESPONSE_S = 0.035  # of the force controller
 _FASTEST_M_S = 0.05  # of its correction
 _FARTHEST_M = 0.012
+_EXPECTED_M = 0.004  # between plan and scan
 _DAMPING_S = 0.004  # of the pad, as a share of its stiffness
 _FRICTION = 0.2
 _ASKED_M, _ASKED_RAD = 0.003, np.radians(4.0)  # between places where the surface is looked for
@@ -184,13 +187,17 @@ def _press(
     wanted = float(action.force_n or 0.0)
     stiffness = max(wanted, 1.0) / PAD_GIVES_M
     gap = _gaps(plan, cell, action, surface, shift_m)
+    planned_gap = gap if not shift_m.any() else _gaps(plan, cell, action, surface, 0.0 * shift_m)
+    expected = _expected(planned_gap)
+    rising = np.gradient(expected, STEP_S) if count > 1 else 0.0 * expected
     travel = np.gradient(plan.places, axis=0) if count > 1 else np.zeros((1, 3))
     travel /= np.maximum(np.linalg.norm(travel, axis=1, keepdims=True), 1e-9)
     gain = STEP_S / (_RESPONSE_S * stiffness)
     most = _FASTEST_M_S * STEP_S
     settling, dwelling = round(SETTLES_S / STEP_S), round(action.dwell_s / STEP_S)
     record = _Record(machine, count + settling + dwelling)
-    offset, before, steady, i, waited, dwelt = 0.0, 0.0, 0, 0, 0, 0
+    # The correction is what the scan lets expect, and what the force asks for beyond it.
+    asked, before, steady, i, waited, dwelt = -float(expected[0]), 0.0, 0, 0, 0, 0
     working = False
     tip, axis = machine.tip()
     still = np.zeros(plan.joints.shape[1])
@@ -207,17 +214,18 @@ def _press(
         if push > 0.0:
             pushed = -push * planned - (_FRICTION * push if working else 0.0) * travel[i]
         moving = working and i < count - 1
+        offset = expected[i] + asked
         machine.step(
             plan.joints[i] + offset * plan.along[i],
-            plan.speeds[i] if moving else still,
+            plan.speeds[i] + rising[i] * plan.along[i] if moving else still,
             plan.accelerations[i] if moving else still,
             pushed,
             tip,
         )
         tip, axis = machine.tip()
         force = machine.force(axis)
-        offset += min(max(gain * (wanted - force), -most), most)
-        offset = min(max(offset, -_FARTHEST_M), _FARTHEST_M)
+        asked += min(max(gain * (wanted - force), -most), most)
+        asked = min(max(asked, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
         aside = away - depth * planned
         record.add(
             machine, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.place[i], moving
@@ -232,6 +240,15 @@ def _press(
             dwelt += 1
         else:
             return record.log(cell, action), offset
+
+
+def _expected(gap: np.ndarray) -> np.ndarray:
+    """How far (t,) the tool must go along its axis to where the surface is; where it is too far to
+    be the one that the plan is on, as far as beside there. gap: (t,)."""
+    there = np.flatnonzero(np.abs(gap) < _EXPECTED_M)
+    if not len(there):
+        return np.zeros(len(gap))
+    return np.interp(np.arange(len(gap)), there, gap[there])
 
 
 def _gaps(

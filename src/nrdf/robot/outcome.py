@@ -11,6 +11,7 @@ import numpy as np
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
 from nrdf.process.patch import inside_margin, patches_of
+from nrdf.process.room import with_room
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import ToolPath
 from nrdf.process.track import covered as reached_by
@@ -39,10 +40,11 @@ class Outcome:
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
     reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
     waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
-    region's points inside its margin that the tool reaches by the plan, by what is left of it when
-    it is driven, and in the simulation. worked, planned: (k,) of those points; region_points: their
-    indices on the target. force_*: while the tool moves along its lines; None where nothing is
-    pressed. off_plan_99_m: of the tool from its line, the way along the axis left out.
+    region's points inside its margin, and with room before them, that the tool reaches by the plan,
+    by what is left of it when it is driven, and in the simulation. worked, planned: (k,) of those
+    points; region_points: their indices on the target. force_*: while the tool moves along its
+    lines; None where nothing is pressed. off_plan_99_m: of the tool from its line, the way along
+    the axis left out.
     """
 
     verdicts: tuple[np.ndarray, ...]
@@ -93,7 +95,7 @@ def outcome(
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
     leans = _leans(lines, program)
-    region = lesson.regions[path.region]
+    region = with_room(surface, lesson.regions[path.region], process.tool.clearance_m)
     inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
     points, normals = surface.points[inside], surface.normals[inside]
     height = process.standoff_m

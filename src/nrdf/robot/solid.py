@@ -17,12 +17,14 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import RobotError
 from nrdf.geometry import thin
+from nrdf.winding import Winding
 
 CELL_M = 0.008
 MARGIN_M = 0.20
 """How far around the object distances are known; farther away, they are at least about that."""
 _BAND = 5.0  # cells around the surface where distances are exact
 _COARSE = 4  # nodes apart that the winding number is asked far from the surface
+_SPECK = 2  # nodes, of a part apart from all others
 _MOST_NODES = 6_000_000
 _MOST_POINTS = 30_000
 _SAME_M = 0.02  # between a mesh and the scan of what it is of
@@ -77,27 +79,17 @@ class Solid:
 def solid_from_points(points: np.ndarray, normals: np.ndarray) -> Solid:
     """A solid from an oriented cloud (n, 3), m: the level set of its winding number.
 
-    The generalised winding number of points (Barill et al., 2018) tells inside from outside, holes
-    in the scan or not; marching cubes make a mesh of its level set, and the distance is that from
-    the points and from the mesh drawn onto the points' planes, so that the surface is where it was
-    scanned. Raises RobotError for an object too large for its cells.
+    The generalised winding number tells inside from outside, holes in the scan or not; marching
+    cubes make a mesh of its level set, and the distance is that from the points and from the mesh
+    drawn onto the points' planes, so that the surface is where it was scanned. Raises RobotError
+    for an object too large for its cells.
     """
     kept = thin(points, _MOST_POINTS, np.random.default_rng(0))
     points = np.ascontiguousarray(points[kept], dtype=np.float64)
     normals = np.ascontiguousarray(normals[kept], dtype=np.float64)
     tree = cKDTree(points)
-    # The disc that a point stands for, from its neighbours of the same side.
-    distance, near = tree.query(points, 17)
-    alike = np.einsum("nka,na->nk", normals[near], normals) > 0.5
-    count = alike.sum(axis=1)
-    area = np.pi * distance[:, -1] ** 2 / np.maximum(count - 0.5, 1.0)
-
-    def winding(nodes: np.ndarray) -> np.ndarray:
-        nodes = np.ascontiguousarray(nodes)
-        return np.asarray(igl.fast_winding_number(points, normals, area, nodes))
-
     grid = _Grid.around(points)
-    value = grid.filled(tree, winding)
+    value = grid.filled(tree, Winding(points, normals, tree))
     vertices, faces = grid.level_set(value)
     # Where points are sparse the level set bulges; the nearest point's plane does not.
     far, nearest = tree.query(vertices, 4)
@@ -147,6 +139,15 @@ def solid_from_file(path: str | Path, points: np.ndarray) -> Solid:
     return solid
 
 
+def _without_specks(value: np.ndarray) -> np.ndarray:
+    """Winding numbers without single nodes of the wrong side, where a sum of many points fails."""
+    for side in (1.0, 0.0):
+        labels, count = ndimage.label((value > 0.5) == (side > 0.5))
+        size = np.bincount(labels.ravel(), minlength=count + 1)
+        value = np.where((size <= _SPECK)[labels] & (labels > 0), 1.0 - side, value)
+    return value
+
+
 @dataclass(frozen=True)
 class _Grid:
     corner: np.ndarray
@@ -180,7 +181,7 @@ class _Grid:
         value = value[np.ix_(*nearest)]
         index = np.flatnonzero(near)
         value.ravel()[index] = winding(self.nodes(index))
-        return value
+        return _without_specks(value)
 
     def _near(self, tree: cKDTree, cells: float) -> np.ndarray:
         """Nodes within a number of cells of the surface's points, roughly."""
