@@ -21,20 +21,20 @@ log = logging.getLogger(__name__)
 KINDS: tuple[Kind, ...] = get_args(Kind)
 PLACEHOLDER = "my-region"
 
-_PAD = {"name": "pad", "radius_mm": 25}
+_PAD = {"name": "pad", "radius_mm": 25, "clearance_mm": 20}
 DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
     "sand": {
-        "tool": {"name": "sanding disc", "radius_mm": 25},
+        "tool": {"name": "sanding disc", "radius_mm": 25, "clearance_mm": 20},
         "overlap": 0.4, "edge_margin_mm": 10, "lead_deg": 3,
         "force_n": 20, "force_tolerance_n": 5, "feed_mm_s": 100, "spindle_rpm": 6000,
     },
     "polish": {
-        "tool": {"name": "polishing pad", "radius_mm": 25}, "trajectory": "cross-hatch",
+        "tool": {"name": "polishing pad", "radius_mm": 25, "clearance_mm": 20}, "trajectory": "cross-hatch",
         "overlap": 0.5, "edge_margin_mm": 5,
         "force_n": 10, "force_tolerance_n": 3, "feed_mm_s": 80, "spindle_rpm": 2000,
     },
     "oil": {
-        "tool": {"name": "oil pad", "radius_mm": 25},
+        "tool": {"name": "oil pad", "radius_mm": 25, "clearance_mm": 20},
         "overlap": 0.2, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
     },
     "paint": {
@@ -44,7 +44,7 @@ DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
         "retract": {"distance_mm": 50, "feed_mm_s": 300},
     },
     "clean": {
-        "tool": {"name": "brush", "radius_mm": 30},
+        "tool": {"name": "brush", "radius_mm": 30, "clearance_mm": 20},
         "overlap": 0.3, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
     },
     "inspect": {
