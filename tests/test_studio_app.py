@@ -176,3 +176,16 @@ def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
     assert not taken_away
     page.does(page.studio.mouse.take, "Turn")
     assert ground in taken_away and not ground.visible
+
+
+def test_the_room_that_a_tool_needs(page):
+    tab = page.studio.panel.process
+    page.does(tab.refresh)
+    assert tab.tool_room.value == 20.0
+    tab.tool_room.value = 35.0
+    page.does(tab._tool)
+    assert page.desk.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
+    tab.tool_room.value = -1.0
+    page.does(tab._tool)
+    page.does(tab.refresh)
+    assert "clearance_m" in tab.told.content and "-0.001" in tab.told.content

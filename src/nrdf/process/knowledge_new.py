@@ -29,8 +29,8 @@ DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
         "force_n": 20, "force_tolerance_n": 5, "feed_mm_s": 100, "spindle_rpm": 6000,
     },
     "polish": {
-        "tool": {"name": "polishing pad", "radius_mm": 25, "clearance_mm": 20}, "trajectory": "cross-hatch",
-        "overlap": 0.5, "edge_margin_mm": 5,
+        "tool": {"name": "polishing pad", "radius_mm": 25, "clearance_mm": 20},
+        "trajectory": "cross-hatch", "overlap": 0.5, "edge_margin_mm": 5,
         "force_n": 10, "force_tolerance_n": 3, "feed_mm_s": 80, "spindle_rpm": 2000,
     },
     "oil": {

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from nrdf.robot.cell import Cell
 from nrdf.robot.engine import mujoco
 from nrdf.robot.timing import STEP_S
-from nrdf.robot.tool import Piece
+from nrdf.robot.tool import Part
 
 STIFFNESS_1_S = 80.0
 """Natural frequency of the joints' position controllers, rad/s; critically damped."""
@@ -33,26 +33,26 @@ def specification(cell: Cell) -> Any:
     spec.compiler.boundmass, spec.compiler.boundinertia = 0.05, 1e-4
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
-    _mount(spec.body(cell.arm.body), cell.arm.T_body_flange, cell.tool.pieces)
+    _mount(spec.body(cell.arm.body), cell.arm.T_body_flange, cell.tool.parts)
     sensor = spec.add_sensor(name=_FORCE, type=mujoco.mjtSensor.mjSENS_FORCE)
     sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_SITE, _SENSOR
     _add_motors(spec, cell)
     return spec
 
 
-def _mount(body: Any, T_body_flange: np.ndarray, pieces: tuple[Piece, ...]) -> None:
+def _mount(body: Any, T_body_flange: np.ndarray, parts: tuple[Part, ...]) -> None:
     tool = body.add_body(name=_TOOL, pos=T_body_flange[:3, 3], gravcomp=1.0)
     tool.quat = _wxyz(T_body_flange[:3, :3])
     tool.add_site(name=_SENSOR)
-    for piece in pieces:
-        kind = mujoco.mjtGeom.mjGEOM_CYLINDER if piece.flat else mujoco.mjtGeom.mjGEOM_CAPSULE
+    for part in parts:
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER if part.flat else mujoco.mjtGeom.mjGEOM_CAPSULE
         tool.add_geom(
-            name=f"nrdf_{piece.name.replace(' ', '_')}",
+            name=f"nrdf_{part.name.replace(' ', '_')}",
             type=kind,
-            fromto=np.concatenate([piece.start, piece.end]),
-            size=[piece.radius, 0.0, 0.0],
+            fromto=np.concatenate([part.start, part.end]),
+            size=[part.radius, 0.0, 0.0],
             density=_DENSITY,
-            rgba=_COLOURS.get(piece.name, (0.55, 0.57, 0.60, 1.0)),
+            rgba=_COLOURS.get(part.name, (0.55, 0.57, 0.60, 1.0)),
         )
 
 

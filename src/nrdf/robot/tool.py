@@ -26,7 +26,7 @@ _MOST_LEAN_RAD, _NOZZLE_LEANS_RAD = np.radians(15.0), np.radians(10.0)
 
 
 @dataclass(frozen=True)
-class Piece:
+class Part:
     """A capsule from start (3,) to end (3,), or with `flat` a cylinder, in the tool frame; m."""
 
     name: str
@@ -49,7 +49,7 @@ class Tool:
     radius_m: float
     T_flange_tcp: np.ndarray
     presses: bool
-    pieces: tuple[Piece, ...]
+    parts: tuple[Part, ...]
 
     @property
     def leans_rad(self) -> float:
@@ -62,17 +62,17 @@ class Tool:
     def spheres(self, link: int, T_link_flange: np.ndarray, step: float = FINE) -> Spheres:
         """Spheres around everything that must touch nothing, `step` radii apart."""
         made = Spheres.none()
-        for piece in self.pieces:
-            if piece.touches:
+        for part in self.parts:
+            if part.touches:
                 continue
-            if piece.flat:
-                along = piece.end - piece.start
+            if part.flat:
+                along = part.end - part.start
                 half = 0.5 * float(np.linalg.norm(along))
-                centres, radius = cover_cylinder(piece.radius, half, step)
+                centres, radius = cover_cylinder(part.radius, half, step)
                 turn = _z_towards(along)
-                centres = centres @ turn.T + 0.5 * (piece.start + piece.end)
+                centres = centres @ turn.T + 0.5 * (part.start + part.end)
             else:
-                centres, radius = cover_capsule(piece.start, piece.end, piece.radius, step)
+                centres, radius = cover_capsule(part.start, part.end, part.radius, step)
             centres = centres @ T_link_flange[:3, :3].T + T_link_flange[:3, 3]
             links = np.full(len(centres), link)
             made += Spheres(centres, np.full(len(centres), radius), links)
@@ -90,26 +90,26 @@ def tool_of(path: ToolPath) -> Tool:
         T_flange_tcp[:3, 3] = path.tcp_m
     if path.tcp_quaternion_xyzw is not None:
         T_flange_tcp[:3, :3] = Rotation.from_quat(path.tcp_quaternion_xyzw).as_matrix()
-    pieces = _pieces(T_flange_tcp, path.tool_radius_m, presses)
-    return Tool(path.tool, path.tool_radius_m, T_flange_tcp, presses, pieces)
+    parts = _parts(T_flange_tcp, path.tool_radius_m, presses)
+    return Tool(path.tool, path.tool_radius_m, T_flange_tcp, presses, parts)
 
 
-def _pieces(T_flange_tcp: np.ndarray, radius: float, presses: bool) -> tuple[Piece, ...]:
+def _parts(T_flange_tcp: np.ndarray, radius: float, presses: bool) -> tuple[Part, ...]:
     tip, axis = T_flange_tcp[:3, 3], T_flange_tcp[:3, 2]
     front = np.array([0.0, 0.0, _SENSOR_LENGTH])
     bend = tip - min(BEHIND_M, 0.5 * float(np.linalg.norm(tip - front))) * axis
-    sensor = Piece("force sensor", np.zeros(3), front, _SENSOR_RADIUS, flat=True)
+    sensor = Part("force sensor", np.zeros(3), front, _SENSOR_RADIUS, flat=True)
     neck = max(_NECK_SHARE * radius, _THINNEST) if presses else _NOZZLE_RADIUS
-    shaft = Piece("shaft", front, bend, _SHAFT_SHARE * neck)
+    shaft = Part("shaft", front, bend, _SHAFT_SHARE * neck)
     if not presses:
-        return sensor, shaft, Piece("nozzle", bend, tip - neck * axis, neck)
+        return sensor, shaft, Part("nozzle", bend, tip - neck * axis, neck)
     pad, holder = tip - PAD_M * axis, tip - (PAD_M + _HOLDER_LENGTH) * axis
     return (
         sensor,
         shaft,
-        Piece("neck", bend, holder, neck),
-        Piece("holder", holder, pad, max(_HOLDER_SHARE * radius, _THINNEST), flat=True),
-        Piece("pad", pad, tip, radius, flat=True, touches=True),
+        Part("neck", bend, holder, neck),
+        Part("holder", holder, pad, max(_HOLDER_SHARE * radius, _THINNEST), flat=True),
+        Part("pad", pad, tip, radius, flat=True, touches=True),
     )
 
 

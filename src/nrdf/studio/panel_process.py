@@ -59,6 +59,10 @@ class ProcessTab:
             for name in rest:
                 if name not in self.numbers:
                     self.numbers[name] = self._number(name)
+            self.tool_room = gui.add_number(
+                "Room the tool needs, mm", 0.0, step=1.0,
+                hint="Free before the surface; places with less are left out. 0: not looked at.",
+            )  # fmt: skip
             self.step = gui.add_dropdown("Step", ("1",), hint="One after another on a region.")
             self.steps = gui.add_button_group("Steps", ("Add one", "Remove this"))
         for name, handle in self.numbers.items():
@@ -68,6 +72,7 @@ class ProcessTab:
         panel.on(self.longest.on_click, lambda _: self._change(direction=None))
         panel.on(self.tool.on_update, lambda _: self._tool())
         panel.on(self.tool_radius.on_update, lambda _: self._tool())
+        panel.on(self.tool_room.on_update, lambda _: self._tool())
         panel.on(self.step.on_update, lambda said: self._step(said.value))
         panel.on(self.steps.on_click, lambda said: self._steps(said.value))
 
@@ -86,7 +91,8 @@ class ProcessTab:
         for name, value in shown_numbers(step).items():
             self.panel.put(self.numbers[name], value)
         self.panel.put(self.tool, str(step["tool"].get("name", "tool")))
-        self.panel.put(self.tool_radius, float(f"{1e3 * step['tool']['radius_m']:.6g}"))
+        for handle, length in ((self.tool_radius, "radius_m"), (self.tool_room, "clearance_m")):
+            self.panel.put(handle, float(f"{1e3 * step['tool'].get(length, 0.0):.6g}"))
         names = tuple(f"{i + 1}: {s.get('name', s['kind'])}" for i, s in enumerate(region.steps))
         self.panel.offer(self.step, names)
         self.panel.put(self.step, names[studio.step])
@@ -147,7 +153,11 @@ class ProcessTab:
         region = self.studio.desk.document.region(self.studio.region)
         assert region is not None
         tool = dict(region.steps[self.studio.step]["tool"])
-        tool |= {"name": self.tool.value, "radius_m": self.tool_radius.value / 1e3}
+        tool |= {
+            "name": self.tool.value,
+            "radius_m": self.tool_radius.value / 1e3,
+            "clearance_m": self.tool_room.value / 1e3,
+        }
         self._change(tool=tool)
 
     def _step(self, shown: str) -> None:
