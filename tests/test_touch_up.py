@@ -48,6 +48,19 @@ def test_stripes_that_are_asked_for_and_points_far_off_stay():
     assert touch_up(SURFACE, far, spread(0.02), SPACING, RADIUS, 0.04) == []
 
 
+def test_with_a_tool_smaller_than_the_points_spacing_that_counts():
+    radius = 0.004
+    beside = np.flatnonzero(
+        (np.abs(SURFACE.points[:, 1] - 0.1) < 0.003) & (np.abs(SURFACE.points[:, 0] - 0.2) < 0.1)
+    )
+    lines = spread(0.1 - 5.0 * radius)
+    made = touch_up(SURFACE, beside, lines, SPACING, radius, 0.006)
+    reached = track_of(made, radius, 0.006).visits(
+        SURFACE.points[beside], SURFACE.normals[beside], radius
+    )
+    assert (reached > 0).all()
+
+
 def test_a_break_in_a_line_is_filled():
     patches = patches_of(SURFACE, ALL)
     whole = spread(0.07, 0.11, 0.19, 0.23)

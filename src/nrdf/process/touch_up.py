@@ -16,11 +16,13 @@ from nrdf.process.track import Neighbours, Track, line_spacing, track_of
 Way = tuple[np.ndarray, np.ndarray]
 """Places (n, 3) near the surface, and the outward normals (n, 3) of its side there."""
 _NEARBY, _NEAR, _FACE = 2.0, 4.0, 3
-"""Radii from a line: points farther off than the first may not belong to the region, unless that
-many are a face of their own nearer than the second."""
+"""Units (the tool's radius, or the points' spacing where that is more) from a line: points farther
+off than the first may not belong to the region, unless that many are a face of their own nearer
+than the second."""
 _ALIKE = 0.7  # cosine between the normals of places that one line may work
 _WIDE = 1.12  # stepovers between lines that need another
 _SHORTEST = 0.2  # spacings of waypoints
+_NEXT = 1.5  # spacings between points that are next to each other
 _ROUNDS = 3
 
 
@@ -36,19 +38,20 @@ def touch_up(
 
     The border of a region is ragged, and at its corners a few points may stand alone on a face of
     their own. Points within two radii of a line, or three that are a face within four, share a
-    line with those next to them, along their longest extent. Points farther off stay as they are,
-    and so do stripes between lines that are wanted farther apart than the tool is wide.
+    line with those next to them, along their longest extent; where the points are farther apart
+    than a radius, their spacing counts in its place. Points farther off stay as they are, and so do
+    stripes between lines that are wanted farther apart than the tool is wide.
     """
-    reach = max(radius_m, 0.55 * stepover_m)
+    reach, unit_m = max(radius_m, 0.55 * stepover_m), max(radius_m, surface.spacing)
     made: list[Line] = []
     for _ in range(_ROUNDS):
         track = track_of([*lines, *made], radius_m, stepover_m)
         visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
         left = wanted[visits == 0]
         away = cKDTree(track.places).query(surface.points[left])[0]
-        left, away = left[away < _NEAR * radius_m], away[away < _NEAR * radius_m]
-        nearby = set(left[away < _NEARBY * radius_m].tolist())
-        groups = _groups(surface, left, radius_m)
+        left, away = left[away < _NEAR * unit_m], away[away < _NEAR * unit_m]
+        nearby = set(left[away < _NEARBY * unit_m].tolist())
+        groups = _groups(surface, left, max(radius_m, _NEXT * surface.spacing))
         groups = [g for g in groups if len(g) >= _FACE or not nearby.isdisjoint(g.tolist())]
         ways = [_along(surface, group, spacing_m) for group in groups]
         new = _lines(surface, ways, surface.spacing, radius_m)
@@ -144,13 +147,13 @@ def _resampled(
     return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1), (at, walked)
 
 
-def _groups(surface: Surface, left: np.ndarray, radius_m: float) -> list[np.ndarray]:
+def _groups(surface: Surface, left: np.ndarray, near: float) -> list[np.ndarray]:
     """Points (k,) by those that face the same way and are next to each other."""
     if not len(left):
         return []
     points, normals = surface.points[left], surface.normals[left]
     next_to = cKDTree(points).sparse_distance_matrix(
-        cKDTree(points), radius_m, output_type="coo_matrix"
+        cKDTree(points), near, output_type="coo_matrix"
     )
     alike = np.einsum("ea,ea->e", normals[next_to.row], normals[next_to.col]) > _ALIKE
     next_to.data = alike.astype(float)
