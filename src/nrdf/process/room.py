@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.process.surface import Surface
 from nrdf.units import in_words
 
-_STEP_M = 0.005
+_STEP_M, _MOST_STEPS = 0.005, 200
 _INSIDE = 0.5  # winding number
+_NEIGHBOURS = 6
 
 
 def with_room(surface: Surface, region: np.ndarray, clearance_m: float) -> np.ndarray:
@@ -22,10 +24,16 @@ def with_room(surface: Surface, region: np.ndarray, clearance_m: float) -> np.nd
     if clearance_m <= 0.0:
         return region
     inside = surface.indices(region)
-    heights = np.linspace(0.0, clearance_m, max(int(np.ceil(clearance_m / _STEP_M)), 1) + 1)[1:]
+    # Beyond the object nothing stands.
+    far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
+    heights = np.linspace(0.0, far, int(np.clip(far / _STEP_M, 1, _MOST_STEPS)) + 1)[1:]
     before = surface.points[inside, None] + heights[:, None] * surface.normals[inside, None]
     wound = surface.winding(before.reshape(-1, 3)).reshape(len(inside), -1)
-    free = inside[(wound < _INSIDE).all(axis=1)]
+    blocked = np.asarray((wound > _INSIDE).any(axis=1))
+    # A sum of many points fails here and there: a point alone is no crevice.
+    places = surface.points[inside]
+    near = cKDTree(places).query(places, np.arange(min(_NEIGHBOURS, len(inside))) + 1)[1]
+    free = inside[~blocked | (blocked[near].sum(axis=1) == 1)]
     if not len(free):
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
