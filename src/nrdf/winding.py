@@ -27,7 +27,13 @@ class Winding:
         alike = np.einsum("nka,na->nk", self._normals[near], self._normals) > 0.5
         self._area = np.pi * distance[:, -1] ** 2 / np.maximum(alike.sum(axis=1) - 0.5, 1.0)
 
-    def __call__(self, places: np.ndarray) -> np.ndarray:
-        """Winding numbers (m,) at places (m, 3)."""
+    def __call__(self, places: np.ndarray, order: int = 2) -> np.ndarray:
+        """Winding numbers (m,) at places (m, 3).
+
+        order: of the expansion that stands for points far away; 1 is four times faster, and enough
+        to tell inside from outside.
+        """
         places = np.ascontiguousarray(places, dtype=np.float64)
-        return np.asarray(igl.fast_winding_number(self._points, self._normals, self._area, places))
+        return np.asarray(
+            igl.fast_winding_number(self._points, self._normals, self._area, places, order)
+        )

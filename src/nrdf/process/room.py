@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.process.surface import Surface
 from nrdf.units import in_words
+from nrdf.winding import Winding
 
 _STEP_M, _MOST_STEPS = 0.005, 200
 _INSIDE = 0.5  # winding number
-_NEIGHBOURS = 6
 
 
 def with_room(surface: Surface, region: np.ndarray, clearance_m: float) -> np.ndarray:
@@ -23,20 +22,28 @@ def with_room(surface: Surface, region: np.ndarray, clearance_m: float) -> np.nd
     """
     if clearance_m <= 0.0:
         return region
+    if clearance_m not in surface.blocked:
+        surface.blocked[clearance_m] = _blocked(surface, clearance_m)
     inside = surface.indices(region)
-    # Beyond the object nothing stands.
-    far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
-    heights = np.linspace(0.0, far, int(np.clip(far / _STEP_M, 1, _MOST_STEPS)) + 1)[1:]
-    before = surface.points[inside, None] + heights[:, None] * surface.normals[inside, None]
-    wound = surface.winding(before.reshape(-1, 3)).reshape(len(inside), -1)
-    blocked = np.asarray((wound > _INSIDE).any(axis=1))
-    # A sum of many points fails here and there: a point alone is no crevice.
-    places = surface.points[inside]
-    near = cKDTree(places).query(places, np.arange(min(_NEIGHBOURS, len(inside))) + 1)[1]
-    free = inside[~blocked | (blocked[near].sum(axis=1) == 1)]
+    free = inside[~surface.blocked[clearance_m][inside]]
     if not len(free):
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
             f"{in_words('clearance_m', clearance_m)} free before the surface; give less, or 0"
         )
     return surface.kept[free]
+
+
+def _blocked(surface: Surface, clearance_m: float) -> np.ndarray:
+    """Whether (n,) something stands before each of a surface's points."""
+    # Beyond the object nothing stands.
+    far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
+    heights = np.linspace(0.0, far, int(np.clip(far / _STEP_M, 1, _MOST_STEPS)) + 1)[1:]
+    before = surface.points[:, None] + heights[:, None] * surface.normals[:, None]
+    wound = Winding(surface.points, surface.normals)(before.reshape(-1, 3), order=1)
+    blocked = np.asarray((wound.reshape(len(before), -1) > _INSIDE).any(axis=1))
+    # A sum of many points fails here and there: a point alone is no crevice.
+    i, j = surface.edges.T
+    beside = np.zeros(len(blocked), bool)
+    beside[i[blocked[j]]] = beside[j[blocked[i]]] = True
+    return np.asarray(blocked & beside)

@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry import thin
-from nrdf.winding import Winding
 
 if TYPE_CHECKING:
     from nrdf.process.patch import Patch
@@ -32,7 +31,8 @@ class Surface:
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
     part are told apart by their normals alone. kept: (n,) indices of the points in the cloud as
-    given, which is thinned where it has very many. Raises ProcessError if the two do not fit each
+    given, which is thinned where it has very many. patches, blocked: what `nrdf.process.patch` and
+    `room` have found out, for their next call. Raises ProcessError if the two do not fit each
     other, are not finite, or are fewer than 8.
     """
 
@@ -52,6 +52,7 @@ class Surface:
         self.points = points[self.kept]
         self.normals = unit(normals[self.kept])
         self.patches: dict[bytes, tuple[Patch, ...]] = {}
+        self.blocked: dict[float, np.ndarray] = {}
 
     def indices(self, region: np.ndarray) -> np.ndarray:
         """Indices (k,), ascending, of `points` for a region (indices into the cloud as given).
@@ -73,10 +74,6 @@ class Surface:
     @cached_property
     def tree(self) -> cKDTree:
         return cKDTree(self.points)
-
-    @cached_property
-    def winding(self) -> Winding:
-        return Winding(self.points, self.normals, self.tree)
 
     @cached_property
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
