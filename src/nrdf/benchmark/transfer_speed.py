@@ -22,7 +22,11 @@ REGIONS = 8
 TRANSFER_BAR_S = 3.0
 """What a transfer of 8 regions must keep to on 2 cores, wall time."""
 _RASTER = Process(
-    kind="sand", stepover_m=0.025, tool=Tool(radius_m=0.025), force_n=20.0, feed_m_s=0.1
+    kind="sand",
+    stepover_m=0.025,
+    tool=Tool(radius_m=0.025, clearance_m=0.02),
+    force_n=20.0,
+    feed_m_s=0.1,
 )
 
 
