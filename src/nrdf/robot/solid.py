@@ -140,7 +140,8 @@ def solid_from_file(path: str | Path, points: np.ndarray) -> Solid:
 
 
 def _without_specks(value: np.ndarray) -> np.ndarray:
-    """Winding numbers without single nodes of the wrong side, where a sum of many points fails."""
+    """Winding numbers without nodes that stand alone, or in twos, on the wrong side: there a sum of
+    many points fails."""
     for side in (1.0, 0.0):
         labels, count = ndimage.label((value > 0.5) == (side > 0.5))
         size = np.bincount(labels.ravel(), minlength=count + 1)
