@@ -91,3 +91,18 @@ def gone_within(seconds, group):
             return True
         time.sleep(0.05)
     return False
+
+
+def die_of_a_large_task(task):
+    number, _ = task
+    if number == 1:
+        os._exit(1)
+    return number
+
+
+def test_a_process_that_dies_while_large_tasks_wait_keeps_nobody_waiting():
+    """More than a pipe holds is on its way to processes that are no more."""
+    tasks = [(number, bytes(10_000_000)) for number in range(8)]
+    results = {task[0]: result for task, result in each(die_of_a_large_task, tasks, workers=2)}
+    assert str(results.pop(1)) == CRASHED
+    assert results == {number: number for number in range(8) if number != 1}

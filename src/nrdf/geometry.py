@@ -67,7 +67,7 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     side = float((highest - lowest).max())
     if side == 0.0:
         return np.sort(rng.choice(total, count, replace=False))
-    kept = np.arange(total)
+    kept: np.ndarray = np.arange(total)
     if total > 8 * count:
         # A first, fine grid makes the bisection independent of the number of points.
         fine = _one_per_cell(points, lowest, side / min(6.0 * np.sqrt(count), 320.0))

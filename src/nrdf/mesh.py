@@ -73,7 +73,7 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     extent = float(np.ptp(vertices, axis=0).max())
     # Exactly equal ones only: a tolerance glues inner to outer walls, which turns the inner ones.
     bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
-    key = np.zeros(len(vertices), dtype=np.uint64)
+    key: np.ndarray = np.zeros(len(vertices), dtype=np.uint64)
     for axis in range(3):  # a hash of 64 bits
         key = (key ^ bits[:, axis] ^ (bits[:, axis] >> np.uint64(29))) * _HASH
         key ^= key >> np.uint64(32)

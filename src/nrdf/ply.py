@@ -7,8 +7,9 @@ memory is set aside for them.
 from __future__ import annotations
 
 import os
-import tempfile
+import secrets
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -261,19 +262,15 @@ def write_atomically(path: Path, parts: list[bytes | memoryview]) -> None:
 
     Raises OutputError if the folder is missing, not writable or full.
     """
-    temporary = None
+    # Named before it exists: whatever ends this process has it cleared away.
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
-        with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=f".{path.name}.", suffix=".part", delete=False
-        ) as file:
-            temporary = file.name
+        with open(temporary, "xb") as file:
             for part in parts:
                 file.write(part)
-        os.chmod(temporary, 0o644)
         os.replace(temporary, path)
-        temporary = None
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()

@@ -74,7 +74,7 @@ def up_axis(name: str) -> np.ndarray:
 
     Raises CloudError for anything else.
     """
-    axis = np.zeros(3)
+    axis: np.ndarray = np.zeros(3)
     if name in AXES:
         axis["xyz".index(name[-1])] = -1.0 if name[0] == "-" else 1.0
         return axis

@@ -89,7 +89,7 @@ def evaluate(
         for reference, target in benchmark.pairs:
             names = (reference.name, target.name)
             if names in kept:
-                done[(spec.name, *names)] = kept[names]
+                done[spec.name, reference.name, target.name] = kept[names]
             else:
                 tasks.append(_Task(spec, benchmark.category, reference, target))
     total = len(benchmark.pairs)

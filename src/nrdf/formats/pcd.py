@@ -31,7 +31,7 @@ def read_pcd(path: Path, _: int) -> RawCloud:
         raise CloudError(
             f"{path}: fields x, y and z are needed; it has {', '.join(said['FIELDS'])}"
         )
-    sensors = np.empty((0, 3))
+    sensors: np.ndarray = np.empty((0, 3))
     try:
         pose = np.array([float(word) for word in said.get("VIEWPOINT", [])])
         grid = int(said.get("HEIGHT", ["1"])[0]) > 1

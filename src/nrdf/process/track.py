@@ -131,8 +131,8 @@ def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Nei
     planes, and measured in space.
     """
     tails = -track.axes
-    nearest = np.full(len(tails), np.inf)
-    owner = np.zeros(len(tails), int)
+    nearest: np.ndarray = np.full(len(tails), np.inf)
+    owner: np.ndarray = np.zeros(len(tails), int)
     for number, patch in enumerate(patches):
         away = _placed(patch, track.places, tails, patch.label == OWN)[0]
         owner = np.where(away < nearest, number, owner)

@@ -95,7 +95,7 @@ def solve(
     """Joints (b, n) that bring the tool to targets, from first guesses; whether (b,) they do."""
     joints = joints.copy()
     good = np.zeros(len(joints), bool)
-    moving = np.arange(len(joints))
+    moving: np.ndarray = np.arange(len(joints))
     for round_ in range(rounds + 1):
         frames = chain.frames(joints[moving])
         away, angle = errors(frames, places[moving], axes[moving])

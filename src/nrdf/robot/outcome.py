@@ -200,7 +200,8 @@ def _swept(
     parts: Sequence[tuple[np.ndarray, np.ndarray]], height: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The tool's places and axes along waypoints (n, 3) and their axes (n, 3), finely."""
-    places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    places: list[np.ndarray] = [np.zeros((0, 3))]
+    axes: list[np.ndarray] = [np.zeros((0, 3))]
     for positions, own in parts:
         steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         way = np.concatenate([[0.0], np.cumsum(steps)])
@@ -214,7 +215,8 @@ def _swept(
 
 def _driven(logs: Sequence[Log], height: float) -> tuple[np.ndarray, np.ndarray]:
     """The tool's places and axes where it really worked."""
-    places, axes = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    places: list[np.ndarray] = [np.zeros((0, 3))]
+    axes: list[np.ndarray] = [np.zeros((0, 3))]
     for log in logs:
         asked = log.action.force_n
         works = log.off_m < _ON_PLAN_M if asked is None else log.force_n > _PRESSES * asked

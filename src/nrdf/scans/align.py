@@ -143,7 +143,7 @@ def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> 
     yaws = 2 * np.pi / _YAWS * np.arange(_YAWS)
     tried = [_Hypothesis(axis, yaw) for axis in ups for yaw in yaws]
     chosen = sparse_subset(working.points, _COARSE_POINTS)
-    costs = judge.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
+    costs: np.ndarray = judge.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
     facing = _facing(judge, working, ups)
     best = _minima(costs, _REFINED)

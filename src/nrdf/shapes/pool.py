@@ -67,11 +67,28 @@ def _pooled(
         except BaseException:
             with _no_interrupt():
                 # Asking politely, by shutdown alone, has been seen to wait forever after Ctrl-C.
-                for process in list((pool._processes or {}).values()):
+                processes = list((pool._processes or {}).values())
+                for process in processes:
                     process.terminate()
+                for process in processes:
+                    process.join()
+                _let_go(pool)
                 pool.shutdown(wait=True, cancel_futures=True)
             raise
+        if pool._broken:
+            _let_go(pool)
         pool.shutdown()
+
+
+def _let_go(pool: ProcessPoolExecutor) -> None:
+    """End the wait of the thread that hands a large task to processes which are no more.
+
+    In Python 3.10, shutting down waits for it forever; later ones do this themselves (CPython issue
+    94777).
+    """
+    queue = getattr(pool, "_call_queue", None)
+    if sys.version_info < (3, 11) and queue is not None:
+        queue._reader.close()
 
 
 def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
@@ -84,13 +101,19 @@ def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
 def _in_process(work: Callable[[Task], Result], task: Task) -> Result:
     # Told to end at work, by an exception, so files are tidied up; elsewhere (while it imports what
     # the work needs) at once, because there the exception would be reported with a traceback.
-    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    before = signal.signal(signal.SIGTERM, _end)
     try:
         return work(task)
     except SystemExit:  # the pool would go on with the next task
         os._exit(1)
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _end(*_: object) -> None:
+    # Told so again, by the pool too, it would leave the tidying up as well.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    sys.exit(1)
 
 
 def _take_signals() -> None:

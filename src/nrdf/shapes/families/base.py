@@ -188,7 +188,7 @@ class Part:
         return self.mapped(MIRROR_Z, slot=slot)
 
     def _map(self, p: Array, q: Array, s: Array) -> Array:
-        points = np.empty((len(s), 3))
+        points: Array = np.empty((len(s), 3))
         points[:, self.axis] = self.start + (self.stop - self.start) * s
         points[:, (self.axis + 1) % 3] = at(self.centre[0], s) + p
         points[:, (self.axis + 2) % 3] = at(self.centre[1], s) + q

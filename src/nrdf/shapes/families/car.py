@@ -302,7 +302,7 @@ def _rails(d: Mapping[str, float], work: Bodywork, rng: np.random.Generator) -> 
     stop = (1 - d["screen_top"]) * d["length"] - 0.1
     if stop - start < 0.6:
         return []
-    s = np.linspace(start, stop, 9) / d["length"]
+    s = np.asarray(np.linspace(start, stop, 9) / d["length"], np.float64)
     z = 0.72 * _half_width(work, 0.5 * (start + stop), d["height"] - 0.13)
     height = _roof_height(work, s, z) + 0.02
     rail = Part(
