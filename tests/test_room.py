@@ -32,6 +32,20 @@ def test_what_lies_under_another_part_has_no_room(gap):
     assert set(free) ^ set(expected) <= set(at_the_rim)
 
 
+def test_a_thin_part_is_not_stepped_over():
+    """A plate from 7 to 11 mm above the top, in the 12 mm that are asked."""
+    low, low_normals = box((0.4, 0.2, 0.4), 4000)
+    plate, plate_normals = box((0.2, 0.004, 0.4), 8000, 1, (0.1, 0.109, 0.0))
+    surface = Surface(np.concatenate([low, plate]), np.concatenate([low_normals, plate_normals]))
+    x, _, z = surface.points.T
+    top = (np.arange(len(x)) < len(low)) & (surface.normals[:, 1] > 0.5)
+    under = np.flatnonzero(top & (x > 0.02) & (x < 0.18) & (np.abs(z) < 0.18))
+    beside = np.flatnonzero(top & (x < -0.02))
+    free = with_room(surface, np.concatenate([under, beside]), 0.012)
+    assert np.isin(under, free).mean() < 0.15
+    assert np.isin(beside, free).all()
+
+
 def test_walls_beside_and_gaps_that_are_wide_enough_do_not_matter():
     surface, top = stacked(0.05)
     np.testing.assert_array_equal(with_room(surface, top, 0.03), top)

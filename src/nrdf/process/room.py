@@ -38,7 +38,7 @@ def _blocked(surface: Surface, clearance_m: float) -> np.ndarray:
     """Whether (n,) something stands before each of a surface's points."""
     # Beyond the object nothing stands.
     far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
-    heights = np.linspace(0.0, far, int(np.clip(far / _STEP_M, 1, _MOST_STEPS)) + 1)[1:]
+    heights = np.linspace(0.0, far, int(np.clip(np.ceil(far / _STEP_M), 1, _MOST_STEPS)) + 1)[1:]
     before = surface.points[:, None] + heights[:, None] * surface.normals[:, None]
     winding = Winding(surface.points, surface.normals, surface.tree)
     wound = winding(before.reshape(-1, 3), order=1)
