@@ -263,7 +263,7 @@ def write_atomically(path: Path, parts: list[bytes | memoryview]) -> None:
     Raises OutputError if the folder is missing, not writable or full.
     """
     # Named before it exists: whatever ends this process has it cleared away.
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
     try:
         with open(temporary, "xb") as file:
             for part in parts:

@@ -9,8 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -19,6 +17,7 @@ from typing import Any
 from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
 from nrdf.field.weights import load_weights, read_metadata
+from nrdf.ply import write_atomically
 
 log = logging.getLogger(__name__)
 
@@ -145,12 +144,11 @@ def add_to_zoo(
     entries = {known.name: known for known in list_models(zoo)} | {name: entry}
     try:
         zoo.mkdir(parents=True, exist_ok=True)
-        temporary = zoo / f".{entry.file}.{os.getpid()}.tmp"
-        shutil.copyfile(path, temporary)
-        os.replace(temporary, zoo / entry.file)
-        _write_index(zoo, entries)
+        content = path.read_bytes()
     except OSError as error:
         raise OutputError(f"cannot write to the zoo {zoo}: {error.strerror or error}") from None
+    write_atomically(zoo / entry.file, [content])
+    _write_index(zoo, entries)
     log.info("%s is in the zoo as '%s'", path, name)
     return entry
 
@@ -160,10 +158,8 @@ def _write_index(zoo: Path, entries: Mapping[str, ZooEntry]) -> None:
     for name in sorted(entries):
         models[name] = asdict(entries[name])
         del models[name]["name"]
-    temporary = zoo / f".{INDEX}.{os.getpid()}.tmp"
     text = json.dumps({"models": models}, indent=2, ensure_ascii=False)
-    temporary.write_text(text + "\n", encoding="utf-8")
-    os.replace(temporary, zoo / INDEX)
+    write_atomically(zoo / INDEX, [f"{text}\n".encode()])
 
 
 def _verified(zoo: Path, entry: ZooEntry) -> Path:
