@@ -55,10 +55,10 @@ class Ellipsoid(Field):
         return self.steep * (1 - far) + self.offset
 
     def describe(self, z, points, normals):
-        raise NotImplementedError
+        raise AssertionError("a surface needs no descriptors")
 
     def invert(self, z, k):
-        raise NotImplementedError
+        raise AssertionError("a surface needs no inverse")
 
 
 def ellipsoid(size=1.0, count=4000) -> Ball:
