@@ -1,0 +1,79 @@
+"""Opening files that somebody else names: regular files only, and never more than fits.
+
+A name from outside may be that of a pipe, on which a reader waits for ever, or of a device, which
+never ends. Every reader of user's files opens them here, or asks `require_file` first.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+from nrdf.errors import NrdfError
+
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe (FIFO)",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def require_file(path: str | Path, error: type[NrdfError]) -> int:
+    """Bytes that the regular file `path` (or what it links to) has.
+
+    Raises `error`, at once, where there is none, or it is a folder, pipe, socket or device.
+    """
+    try:
+        return _size(path, os.stat(path), error)
+    except (OSError, ValueError) as problem:  # ValueError: a NUL in the name
+        raise _unreadable(path, problem, error) from None
+
+
+def open_file(path: str | Path, error: type[NrdfError]) -> BinaryIO:
+    """The regular file `path`, opened to read bytes. Raises `error` as `require_file` does, and
+    where it may not be read."""
+    require_file(path, error)  # before opening: opening alone makes some devices act
+    try:
+        # Without waiting: another process may have put a pipe in its place by now.
+        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        handle = os.open(path, flags)
+        file = os.fdopen(handle, "rb")
+    except OSError as problem:
+        raise _unreadable(path, problem, error) from None
+    try:
+        _size(path, os.fstat(handle), error)
+    except NrdfError:
+        file.close()
+        raise
+    return file
+
+
+def read_file(path: str | Path, error: type[NrdfError], most: int) -> bytes:
+    """The content of the regular file `path`, of at most `most` bytes.
+
+    Raises `error` as `open_file` does, for a larger file, and where reading fails.
+    """
+    with open_file(path, error) as file:
+        try:
+            content = file.read(most + 1)
+        except OSError as problem:
+            raise _unreadable(path, problem, error) from None
+    if len(content) > most:
+        raise error(f"{path} has more than {most / 1e6:g} MB, too much for what it should be")
+    return content
+
+
+def _size(path: str | Path, found: os.stat_result, error: type[NrdfError]) -> int:
+    if not stat.S_ISREG(found.st_mode):
+        kind = _KINDS.get(stat.S_IFMT(found.st_mode), "something else")
+        raise error(f"cannot read {path}: it is {kind}; a file is needed")
+    return found.st_size
+
+
+def _unreadable(path: str | Path, problem: Exception, error: type[NrdfError]) -> NrdfError:
+    name = str(path).replace("\0", "\\0")
+    return error(f"cannot read {name}: {getattr(problem, 'strerror', None) or problem}")
