@@ -128,6 +128,11 @@ def test_what_is_not_there_comes_back_empty_with_the_reason(retrieve, files, tmp
     assert seat["share_observed"] < 0.2 and 0.5 < seat["confidence_of_presence"] <= 1
     assert read_header(out / "seat.ply").count("vertex") == 0
     assert "region 'seat': not observed (confidence 0." in capsys.readouterr().err
+    words = {"target": [files / "other.ply"], "region": [files / "seat.ply"]}
+    assert retrieve(**words, overwrite=[]) == 4
+    said = capsys.readouterr().err
+    assert "none of the regions was found" in said and "try --up z" in said
+    assert (out / "report.json").exists() and not (out / "legs.ply").exists()
 
 
 def test_full_folder_is_refused_before_anything_is_computed(retrieve, tmp_path, capsys):

@@ -86,12 +86,32 @@ def test_a_limit_that_is_not_met_ends_with_3_after_writing(taught, untrained, ca
 
 
 def test_a_region_without_enough_confidence_is_skipped(taught, untrained, capsys):
-    assert transfer(taught, untrained, "--min-confidence", "1.01") == 0
+    assert transfer(taught, untrained, "--min-confidence", "1") == 4
     said = " ".join(capsys.readouterr().err.split())
-    assert "region 'top' is skipped: confidence" in said and "below 1.01" in said
+    assert "region 'top' is skipped: confidence" in said and "below 1" in said
     assert not (taught / "job" / "toolpaths.json").exists()
-    limits = ("--min-confidence", "1.01", "--require-all", "--overwrite")
-    assert transfer(taught, untrained, *limits) == 3
+    assert json.loads((taught / "job" / "report.json").read_text())["total"]["paths"] == 0
+
+
+def test_without_any_tool_path_each_region_says_why_and_a_hint_follows(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--min-confidence", "1", "--require-all") == 4
+    said = capsys.readouterr().err
+    assert "nrdf: no tool path could be planned:\n  region 'top': confidence" in said
+    assert "\n  region 'front': confidence" in said and "try --up z" in said
+    words = ("--min-confidence", "1", "--up", "y", "--skip", "floor", "--overwrite")
+    assert transfer(taught, untrained, *words) == 4
+    assert "is y the direction that points up?" in capsys.readouterr().err
+
+
+def test_strict_takes_no_doubt_and_the_result_is_written(taught, untrained, capsys):
+    write_cloud(taught / "new.ply", PointCloud(1000 * cloud(seed=1).points))
+    assert transfer(taught, untrained) == 0
+    assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
+    assert transfer(taught, untrained, "--strict", "--overwrite") == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "nrdf: doubtful, with --strict:" in said and "taken to be mm" in said
+    doubts = json.loads((taught / "job" / "report.json").read_text())["doubts"]
+    assert "taken to be mm" in doubts[0] and (taught / "job" / "toolpaths.json").exists()
 
 
 def test_a_placeholder_says_what_to_do(files, capsys):

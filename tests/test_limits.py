@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from nrdf.process.limits import Limits
+from nrdf.process.limits import Limits, doubts_of
+from nrdf.regions.presence import ABSENT, NOT_OBSERVED, Presence
 from taught_box import MEASURES, made_up
 
 
@@ -39,3 +40,38 @@ def test_what_has_no_path_counts_only_where_all_are_required():
 def test_a_single_line_has_no_spacing_to_be_too_wide():
     alone = made_up(measures=replace(MEASURES, line_spacing_worst_m=None))
     assert Limits(max_line_spacing_m=0.001).broken(alone) == []
+
+
+def test_what_is_sure_is_not_doubted():
+    assert doubts_of(made_up(confidence=0.5)) == []
+    assert doubts_of(with_match(made_up(missing="absent"), presence=absent(0.95))) == []
+    assert doubts_of(with_match(made_up(missing="marked as not there"), method="marked")) == []
+
+
+@pytest.mark.parametrize(
+    ("transferred", "message"),
+    [
+        (made_up(confidence=0.3), "region 'top': doubtful: confidence 0.30; look at it"),
+        (made_up(missing="confidence 0.10, below 0.2"), "perhaps there all the same: confidence"),
+        (replace(made_up(), doubts=("the pose is ambiguous",)), "the pose is ambiguous"),
+    ],
+)
+def test_what_is_doubtful_is_said(transferred, message):
+    (line,) = doubts_of(transferred)
+    assert message in line
+
+
+def test_a_region_that_may_be_there_is_doubtful():
+    for presence in (absent(0.6), Presence(NOT_OBSERVED, 0.95, 0.0)):
+        skipped = with_match(made_up(missing="skipped"), presence=presence)
+        assert doubts_of(skipped) == ["region 'top': perhaps there all the same: skipped"]
+
+
+def absent(confidence):
+    return Presence(ABSENT, confidence, 0.5)
+
+
+def with_match(transferred, **changes):
+    found = transferred.regions["top"]
+    regions = {"top": replace(found, match=replace(found.match, **changes))}
+    return replace(transferred, regions=regions)

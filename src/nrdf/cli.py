@@ -20,9 +20,10 @@ Teach a region once, on one object, and find it on every object of that kind.
 NOTES = """
 Every verb explains itself, with an example:  nrdf VERB --help
 -v shows debug messages; nrdf --version the version.
-Ends with 0; 1 where some shapes could not be used; 2 for bad input, with a
-message that says what to do; 3 where a limit that was set is not met, or with
---strict where anything is doubtful; 130 after Ctrl-C."""
+Ends with 0 where all is well; 1 where some shapes could not be used; 2 for bad
+input, with a message that says what to do; 3 where a limit is not met, or with
+--strict where anything is doubtful; 4 where nothing was found or could be
+planned; 130 after Ctrl-C. With 3 and 4 the result is written all the same."""
 
 RESUMABLE = (
     "synth",

@@ -50,9 +50,15 @@ class OutputError(NrdfError):
 
 
 class LimitError(NrdfError):
-    """A limit that the user set on a result is not met; the result is there all the same."""
+    """A limit on a result is not met, or it is doubtful; the result is there all the same."""
 
     exit_code = 3
+
+
+class NothingFoundError(NrdfError):
+    """Nothing was found, or nothing could be planned; the report, there all the same, says why."""
+
+    exit_code = 4
 
 
 def unknown_name(kind: str, name: str, known: list[str] | tuple[str, ...]) -> str:

@@ -25,7 +25,7 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
-from nrdf.errors import CloudError
+from nrdf.errors import CloudError, NothingFoundError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -63,7 +63,8 @@ def retrieve(
     Writes into the output folder: for each region a PLY of the target's own points in it, with
     confidence (0 to 1) and index (into the target) as properties; report.json; picture.png. All
     in the target file's own coordinates and unit. A region that the target does not have, or that
-    the scan did not see, is empty, and the report says which.
+    the scan did not see, is empty, and the report says which. Where none of them is found it ends
+    with 4, after writing.
 
     Example: nrdf retrieve --model chair --reference ref.ply --region seat.ply back.ply --target
     new.ply --out result/
@@ -147,6 +148,8 @@ def retrieve(
         write_report(folder, report)
     show_matches(matches, target_cloud)
     console.print(f"{clock.total:.1f} s; results, report and picture in {out}")
+    if not any(len(match.indices) for match in matches.values()):
+        raise NothingFoundError(_nothing_found(target, up))
     return 3 if strict and doubts else 0
 
 
@@ -221,6 +224,15 @@ def describe_matches(matches: Mapping[str, Match], target: PointCloud) -> dict[s
         }
         for name, match in matches.items()
     }
+
+
+def _nothing_found(target: Path, up: str | None) -> str:
+    return f"none of the regions was found on {target}: " + (
+        "is it of the model's category, upright (+Y up) and facing +X? For a scan in another pose "
+        "try --up z (or x, y, -z, auto)"
+        if up is None
+        else f"is it of the model's category, and is {up} the direction that points up?"
+    )
 
 
 def show_matches(matches: Mapping[str, Match], target: PointCloud) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,7 @@ def transfer(
     max_axis_error_deg: float | None = None,
     max_cycle_time_s: float | None = None,
     require_all: bool = False,
+    strict: bool = False,
     device: str = "cpu",
     overwrite: bool = False,
 ) -> None:
@@ -41,7 +42,8 @@ def transfer(
     Writes into the output folder: knowledge.yaml (the same format, for the new object),
     target.ply and regions/ (in metres), toolpaths.json (for `nrdf export`), report.json,
     report.html (opens without a network) and picture.png. A region that the new object lacks is
-    reported and skipped. A limit that is set and not met ends with exit code 3, after writing.
+    reported and skipped. Ends, after writing, with 4 where no tool path could be planned, and
+    with 3 where a limit that is set is not met.
 
     Example: nrdf transfer chair.yaml --target new.ply --out job/ --min-coverage 0.98
 
@@ -65,12 +67,14 @@ def transfer(
         max_axis_error_deg: Limit on the tool axis' error, of 99 % of the waypoints.
         max_cycle_time_s: Limit on the time of all tool paths together.
         require_all: Limit: every process of every region must have a tool path.
+        strict: Limit: nothing may be doubtful about the target's pose, unit and kind, and about
+            its regions, absent ones included.
         device: cpu, cuda, cuda:N or auto.
         overwrite: Replace an earlier result in the output folder.
     """
     import math
 
-    from nrdf.errors import CloudError, LimitError
+    from nrdf.errors import CloudError, LimitError, NothingFoundError
     from nrdf.output import output_folder
     from nrdf.process.limits import Limits
 
@@ -87,7 +91,7 @@ def transfer(
     with output_folder(out, overwrite) as folder:
         import nrdf
         from nrdf.process.job_folder import write_transfer
-        from nrdf.process.lesson import known_unit, read_lesson
+        from nrdf.process.lesson import read_lesson, unit_and_doubts
         from nrdf.process.transfer import MIN_CONFIDENCE, Teacher
 
         lesson = read_lesson(knowledge)
@@ -96,23 +100,20 @@ def transfer(
         scan = None
         if up is None:
             cloud = nrdf.read_cloud(target, topic=topic)
-            known = known_unit(cloud, unit, category, str(target), "--unit")
+            known, doubts = unit_and_doubts(cloud, unit, category, str(target), "--unit")
         else:
             with errors.status("alignment"):
                 examples = stand_ins(loaded, lesson.cloud)
                 scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
-            known = _scan_unit(scan, target)
+            known, guessed = _scan_unit(scan, target)
+            doubts = [*guessed, *scan.doubts]
         with errors.status("reference"):
             teacher = Teacher(lesson, loaded)
         marked = _marked(region, known)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
-            if scan is None:
-                transferred = teacher.transfer(cloud, known, least, marked)
-            else:
-                transferred = teacher.transfer(scan.embed_in_metres(known), None, least, marked)
-                warnings = (*scan.doubts, *transferred.warnings)
-                transferred = replace(transferred, warnings=warnings)
+            given, said = (cloud, known) if scan is None else (scan.embed_in_metres(known), None)
+            transferred = teacher.transfer(given, said, least, marked, doubts=doubts)
         origin = {
             "command": command_line(),
             "knowledge": str(knowledge),
@@ -125,9 +126,29 @@ def transfer(
             report = write_transfer(folder, transferred, limits, target.name, origin)
     show_transfer(report)
     console.print(f"{_summary(report)}; all in {out}")
-    broken = report["limits"]["not_met"]
-    if broken:
-        raise LimitError("limits not met:\n  " + "\n  ".join(broken))
+    if not report["total"]["paths"]:
+        raise NothingFoundError(_nothing_planned(report, category, up))
+    broken, doubted = report["limits"]["not_met"], report["doubts"] if strict else []
+    if broken or doubted:
+        parts = (("limits not met", broken), ("doubtful, with --strict", doubted))
+        lines = [line for title, of in parts if of for line in (f"{title}:", *_indented(of))]
+        raise LimitError("\n".join(lines))
+
+
+def _nothing_planned(report: dict[str, Any], category: str, up: str | None) -> str:
+    """Why a transfer ends without any tool path, region by region, and what to try."""
+    reasons = {f"region '{p['region']}': {p['left_out_because']}": None for p in report["paths"]}
+    try_ = (
+        f"is this a {category}, upright (+Y up) and facing +X? For a scan in another pose try "
+        "--up z (or x, y, -z, auto)"
+        if up is None
+        else f"is this a {category}, and is {up} the direction that points up? See `nrdf align`"
+    )
+    return "\n".join(["no tool path could be planned:", *_indented(reasons), try_])
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return [f"  {line}" for line in lines]
 
 
 def show_transfer(report: dict[str, Any]) -> None:
@@ -155,8 +176,11 @@ def _marked(files: tuple[Path, ...], unit: str) -> dict[str, Any]:
     return {n: v if v.ndim == 1 else v * METRES[unit] for n, v in found.items()}
 
 
-def _scan_unit(scan: AlignedScan, target: Path) -> str:
-    """The scan's unit. Raises ProcessError unless it is given or only one is plausible."""
+def _scan_unit(scan: AlignedScan, target: Path) -> tuple[str, list[str]]:
+    """The scan's unit, and what is doubtful about it beyond the scan's own doubts.
+
+    Raises ProcessError unless it is given or only one is plausible.
+    """
     from nrdf.errors import ProcessError
     from nrdf.units import METRES
 
@@ -166,10 +190,10 @@ def _scan_unit(scan: AlignedScan, target: Path) -> str:
         raise ProcessError(
             f"{target} does not say its unit{why}: give --unit ({', '.join(METRES)})"
         )
-    if unit.origin == "guessed":
-        said = f"{target} does not say its unit; taken to be {unit.name}, from the object's size"
-        errors.print(said, style="yellow")
-    return unit.name
+    if unit.origin != "guessed":
+        return unit.name, []
+    said = f"{target} does not say its unit; taken to be {unit.name}, from the object's size"
+    return unit.name, [said]
 
 
 def _summary(report: dict[str, Any]) -> str:

@@ -87,12 +87,23 @@ def overlaps(regions: dict[str, np.ndarray]) -> list[str]:
 
 
 def known_unit(cloud: PointCloud, unit: str | None, category: str, what: str, option: str) -> str:
+    """As `unit_and_doubts`; what is doubtful is logged as warnings."""
+    known, doubts = unit_and_doubts(cloud, unit, category, what, option)
+    for doubt in doubts:
+        log.warning("%s", doubt)
+    return known
+
+
+def unit_and_doubts(
+    cloud: PointCloud, unit: str | None, category: str, what: str, option: str
+) -> tuple[str, list[str]]:
     """The unit of a cloud: the one its file gives, or `unit`, or told by its category's usual size.
 
-    `what` names the cloud and `option` the way to give a unit, in messages. A guess, and a size
-    that its category does not have, are logged as warnings. Raises ProcessError where two units
-    contradict each other, or where none is given and the size fits several or none.
+    `what` names the cloud and `option` the way to give a unit, in messages. Returned with what is
+    doubtful about it: a guess, a size that its category does not have. Raises ProcessError where
+    two units contradict each other, or where none is given and the size fits several or none.
     """
+    doubts = []
     if unit is not None and cloud.unit not in (None, unit):
         raise ProcessError(f"{what}: {option} is {unit}, but the file says {cloud.unit}")
     size = float(np.ptp(cloud.points, axis=0).max())
@@ -105,13 +116,13 @@ def known_unit(cloud: PointCloud, unit: str | None, category: str, what: str, op
                 f"it{_usual(category)}: give {option} ({', '.join(METRES)})"
             )
         told = f"because its longest side is {size:.4g}{_usual(category)}"
-        log.warning("%s does not say its unit; taken to be %s, %s", what, known, told)
+        doubts.append(f"{what} does not say its unit; taken to be {known}, {told}")
     metres = size * METRES[known]
     low, high = USUAL_SIZES.get(category, (0.0, np.inf))
     if not low / _ODD_SIZE <= metres <= high * _ODD_SIZE:
         odd = f"{metres:.4g} m long{_usual(category)}"
-        log.warning("%s is %s: is its unit, %s, right?", what, odd, known)
-    return known
+        doubts.append(f"{what} is {odd}: is its unit, {known}, right?")
+    return known, doubts
 
 
 def checksum(path: Path) -> str:

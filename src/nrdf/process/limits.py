@@ -1,12 +1,38 @@
-"""Limits that a user sets on a transfer, and which of them are not met."""
+"""What speaks against a transfer: limits that are not met, and what is doubtful about it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from nrdf.process.coverage import Measures
-from nrdf.process.transfer import Transferred
+from nrdf.process.transfer import FoundRegion, Transferred
+from nrdf.regions.presence import ABSENT
 from nrdf.units import in_words
+
+DOUBTFUL = 0.4
+"""Confidence below which a region that was found should be looked at."""
+SURE = 0.9
+"""Confidence from which a region is absent beyond doubt."""
+
+
+def doubts_of(transferred: Transferred) -> list[str]:
+    """What is doubtful about a transfer: the object (pose, unit, kind), then its regions.
+
+    A region is in doubt where it was found with little confidence, and where it was skipped and is
+    not absent beyond doubt. `nrdf transfer --strict` takes none of this.
+    """
+    regions = ((n, _doubt(region)) for n, region in transferred.regions.items())
+    return [*transferred.doubts, *(f"region '{n}': {doubt}" for n, doubt in regions if doubt)]
+
+
+def _doubt(region: FoundRegion) -> str:
+    match = region.match
+    if not region.missing:
+        said = f"doubtful: confidence {match.score:.2f}; look at it"
+        return said if match.score < DOUBTFUL else ""
+    absent = match.presence.reason == ABSENT and match.presence.confidence >= SURE
+    known = absent or match.method == "marked"
+    return "" if known else f"perhaps there all the same: {region.missing}"
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,10 @@ import numpy as np
 
 from nrdf.process.coverage import Measures
 from nrdf.process.knowledge import Process
-from nrdf.process.limits import Limits
+from nrdf.process.limits import Limits, doubts_of
 from nrdf.process.transfer import Transferred, TransferredPath
 from nrdf.units import in_words
 
-DOUBTFUL = 0.4
-"""Confidence below which a region that was found should be looked at."""
 FIGURES = (
     "coverage", "overlap", "line spacing, mean · worst", "off surface, 99 % · worst",
     "axis off, 99 %", "length", "time",
@@ -31,8 +29,11 @@ def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
     regions = transferred.regions
     paths = [_path(step, bool(regions[step.region].missing)) for step in transferred.paths]
     driven = [step.measures for step in transferred.paths if step.measures is not None]
-    warnings = list(transferred.warnings)
-    warnings += [f"region '{n}': {w}" for n, w in _region_warnings(transferred)]
+    doubts = doubts_of(transferred)
+    # A skipped region is warned about as such.
+    skipped = tuple(f"region '{name}':" for name, r in regions.items() if r.missing)
+    warnings = [doubt for doubt in doubts if not doubt.startswith(skipped)]
+    warnings += transferred.warnings
     for step in paths:
         if step["warnings"]:
             said = "; ".join(step["warnings"])
@@ -51,6 +52,7 @@ def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
             "cycle_time_s": sum(m.cycle_time_s for m in driven),
         },
         "warnings": warnings,
+        "doubts": doubts,
         "limits": {
             "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
             "not_met": limits.broken(transferred),
@@ -74,14 +76,6 @@ def _regions(transferred: Transferred) -> dict[str, Any]:
             ),
         }  # fmt: skip
     return regions
-
-
-def _region_warnings(transferred: Transferred) -> list[tuple[str, str]]:
-    lines = []
-    for name, region in transferred.regions.items():
-        if not region.missing and region.match.score < DOUBTFUL:
-            lines.append((name, f"doubtful: confidence {region.match.score:.2f}; look at it"))
-    return lines
 
 
 def _path(step: TransferredPath, skipped: bool) -> dict[str, Any]:

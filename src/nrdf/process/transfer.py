@@ -9,9 +9,10 @@ A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any n
 
 from __future__ import annotations
 
+import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +28,7 @@ from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
 from nrdf.process.knowledge import Line, Process, Transfer
-from nrdf.process.lesson import Lesson, known_unit, overlaps
+from nrdf.process.lesson import Lesson, overlaps, unit_and_doubts
 from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught import TaughtLine, taught_lines
@@ -37,6 +38,8 @@ from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
 from nrdf.similarity import Similarity
+
+log = logging.getLogger(__name__)
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
@@ -76,7 +79,9 @@ class Transferred:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
     target: with normals, estimated where its file had none. seconds: time by phase. pose: from
-    canonical coordinates to the target's, for pictures that stand upright.
+    canonical coordinates to the target's, for pictures that stand upright. doubts: what is doubtful
+    about the object as a whole: its pose, its unit, whether it is of that kind at all; those about
+    regions are added by `nrdf.process.limits.doubts_of`.
     """
 
     lesson: Lesson
@@ -86,6 +91,7 @@ class Transferred:
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     pose: Similarity | None = None
+    doubts: tuple[str, ...] = ()
 
     def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
         """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
@@ -125,6 +131,7 @@ class Teacher:
         min_confidence: float = MIN_CONFIDENCE,
         marked: Mapping[str, ArrayLike] | None = None,
         progress: Callable[[int, int], None] | None = None,
+        doubts: Sequence[str] | None = None,
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
@@ -134,15 +141,21 @@ class Teacher:
         region there is left out with the reason. marked: regions that a person has marked on the
         target, by name, as `region_indices` takes them, points in metres; they are taken as they
         are, and a mask that is False everywhere says that the region is not there. `progress` is
-        told (done, all) steps. Raises CloudError for a target that cannot be used, ProcessError
-        for one whose unit nothing tells, RegionError for a marked region that is not taught or
-        not on the target.
+        told (done, all) steps. doubts: what is doubtful about the target's pose and unit; unless
+        given, its unit is judged here, and logged as a warning where it is doubtful. Raises
+        CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
+        RegionError for a marked region that is not taught or not on the target.
         """
         start = time.perf_counter()
         if isinstance(target, Embedded):
             embedded = self.taught.facing(self.lesson.regions, target)
         else:
-            known = known_unit(target, unit, self.lesson.knowledge.category, "the target", "unit")
+            category = self.lesson.knowledge.category
+            known, doubted = unit_and_doubts(target, unit, category, "the target", "unit")
+            if doubts is None:
+                doubts = doubted
+                for doubt in doubted:
+                    log.warning("%s", doubt)
             embedded = self.model.embed(in_metres(target, known))
         matches = self.taught.retrieve_all(self.lesson.regions, embedded)
         matches |= self._marked(marked or {}, matches, embedded.cloud)
@@ -171,7 +184,10 @@ class Teacher:
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
         cloud, pose = with_normals(embedded), embedded.pose
-        return Transferred(self.lesson, cloud, found, tuple(paths), warnings, seconds, pose)
+        made = tuple(paths)
+        return Transferred(
+            self.lesson, cloud, found, made, warnings, seconds, pose, tuple(doubts or ())
+        )
 
     def _marked(
         self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud

@@ -11,7 +11,7 @@ import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.process.knowledge_check import Checked, check_process
-from nrdf.process.report import DOUBTFUL
+from nrdf.process.limits import DOUBTFUL
 from nrdf.process.transfer import Teacher, Transferred, touched
 from nrdf.regions.embedded import Embedded
 from nrdf.studio.body import REFERENCE

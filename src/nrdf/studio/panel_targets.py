@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nrdf.errors import NrdfError
-from nrdf.process.limits import Limits
-from nrdf.process.report import DOUBTFUL, report_of
+from nrdf.process.limits import DOUBTFUL, Limits
+from nrdf.process.report import report_of
 from nrdf.studio.colours import COLOURINGS
 from nrdf.studio.panel_object import AS_IN_FILE, unit_of
 from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled, read_upload
