@@ -55,11 +55,34 @@ def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         )
     faces = np.asarray(mesh.faces, dtype=np.int64)
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    try:
+        return clean(*check_mesh(vertices, faces))
+    except DataError as error:
+        raise DataError(f"{path}: damaged: {error}") from error
+
+
+def check_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The mesh as float64 (v, 3) and int64 (f, 3), in memory as native code wants them.
+
+    Raises DataError where there is no face, a face names a vertex that does not exist, or a vertex
+    that is used is not finite. Vertices that no face uses are moved onto one that is used.
+    """
+    vertices = np.array(vertices, dtype=np.float64, order="C")
+    faces = np.ascontiguousarray(faces, dtype=np.int64)
+    if vertices.ndim != 2 or faces.ndim != 2 or (vertices.shape[1], faces.shape[1]) != (3, 3):
+        raise DataError(
+            f"vertices {vertices.shape} and faces {faces.shape} must be (v, 3) and (f, 3)"
+        )
+    if not len(faces):
+        raise DataError("the mesh has no faces")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise DataError(f"{path}: damaged: a face names a vertex that does not exist")
-    if not np.isfinite(vertices[np.unique(faces)]).all():
-        raise DataError(f"{path}: has vertices that are NaN or infinite")
-    return clean(vertices, faces)
+        raise DataError("a face names a vertex that does not exist")
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    if not np.isfinite(vertices[used]).all():
+        raise DataError("the mesh has vertices that are NaN or infinite")
+    vertices[~used] = vertices[faces[0, 0]]
+    return vertices, faces
 
 
 def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -40,7 +40,7 @@ def _blocked(surface: Surface, clearance_m: float) -> np.ndarray:
     far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
     heights = np.linspace(0.0, far, int(np.clip(np.ceil(far / _STEP_M), 1, _MOST_STEPS)) + 1)[1:]
     before = surface.points[:, None] + heights[:, None] * surface.normals[:, None]
-    winding = Winding(surface.points, surface.normals, surface.tree)
+    winding = Winding(surface.points, surface.normals)
     wound = winding(before.reshape(-1, 3), order=1)
     blocked = np.asarray((wound.reshape(len(before), -1) > _INSIDE).any(axis=1))
     # A sum of many points fails here and there: a point alone is no crevice.

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import RobotError
 from nrdf.geometry import thin
-from nrdf.winding import Winding
+from nrdf.winding import Winding, mesh_winding_numbers
 
 CELL_M = 0.008
 MARGIN_M = 0.20
@@ -89,7 +89,7 @@ def solid_from_points(points: np.ndarray, normals: np.ndarray) -> Solid:
     normals = np.ascontiguousarray(normals[kept], dtype=np.float64)
     tree = cKDTree(points)
     grid = _Grid.around(points)
-    value = grid.filled(tree, Winding(points, normals, tree))
+    value = grid.filled(tree, Winding(points, normals))
     vertices, faces = grid.level_set(value)
     # Where points are sparse the level set bulges; the nearest point's plane does not.
     far, nearest = tree.query(vertices, 4)
@@ -108,14 +108,12 @@ def solid_from_mesh(vertices: np.ndarray, faces: np.ndarray, origin: str = "mesh
     """A solid from a mesh with outward faces, m; parts may overlap, and small holes do no harm."""
     import trimesh
 
-    from nrdf.shapes.occupancy import winding_numbers
-
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     grid = _Grid.around(vertices)
     wanted = int(np.clip(mesh.area / (0.4 * grid.cell) ** 2, 2_000, 200_000))
     samples = np.asarray(trimesh.sample.sample_surface(mesh, wanted, seed=0)[0])
     tree = cKDTree(samples)
-    value = grid.filled(tree, lambda nodes: winding_numbers(vertices, faces, nodes))
+    value = grid.filled(tree, lambda nodes: mesh_winding_numbers(vertices, faces, nodes))
     return grid.solid(value, vertices, faces, samples, origin)
 
 

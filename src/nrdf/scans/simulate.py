@@ -10,6 +10,7 @@ import numpy as np
 from nrdf.cloud import PointCloud
 from nrdf.errors import DataError
 from nrdf.geometry import canonical_transform
+from nrdf.mesh import check_mesh
 from nrdf.similarity import Similarity
 
 _FLOOR_SIZE = 1.5  # half the side of the floor that is seen, in longest sides of the object
@@ -72,8 +73,7 @@ def simulate_scan(
     unless given). Raises DataError for settings that make no sense, or cameras that see nothing.
     """
     _check(settings)
-    vertices = np.ascontiguousarray(vertices, np.float64)
-    faces = np.ascontiguousarray(faces, np.int64)
+    vertices, faces = check_mesh(vertices, faces)
     middle, size = canonical_transform(vertices[np.unique(faces)])
     radius = float(np.linalg.norm(vertices - middle, axis=1).max())
     if settings.distance * size <= radius:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import igl
 import numpy as np
+
+from nrdf.winding import mesh_winding_numbers
 
 PADDING = 0.1
 """Share of the longest side by which the box of uniform queries is larger (Mescheder 2019)."""
@@ -17,18 +18,7 @@ def inside(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.nd
     The winding number is above one half, so parts may overlap and small holes do no harm. A sheet
     without thickness has no inside.
     """
-    return winding_numbers(vertices, faces, points) > 0.5
-
-
-def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Generalised winding numbers (n,) of `points` (n, 3) in the mesh of outward `faces`.
-
-    1 inside a closed surface, 0 outside (Jacobson et al., 2013; fast form of Barill et al., 2018).
-    """
-    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-    faces = np.ascontiguousarray(faces, dtype=np.int64)
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    return np.asarray(igl.fast_winding_number(vertices, faces, points))
+    return mesh_winding_numbers(vertices, faces, points) > 0.5
 
 
 def occupancy_queries(surface: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:

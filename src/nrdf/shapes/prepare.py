@@ -25,8 +25,9 @@ from nrdf.shapes.dataset import (
     make_folder,
     write_shape,
 )
-from nrdf.shapes.occupancy import occupancy_queries, winding_numbers
+from nrdf.shapes.occupancy import occupancy_queries
 from nrdf.shapes.pool import each
+from nrdf.winding import mesh_winding_numbers
 
 ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
 LEAST_ENCLOSED = 0.5  # share of the skin that must have an inside behind it
@@ -151,7 +152,8 @@ def prepare_mesh(path: Path, category: str, settings: Settings, source: str = ""
     faces, skin = outer_skin(vertices, faces, settings.surface_points, rng)
     queries = occupancy_queries(skin.points, settings.queries, rng)
     probes = (skin.points - _PROBE * skin.normals)[:1024]
-    winding = winding_numbers(vertices, faces, np.concatenate([probes, queries.astype("f8")]))
+    places = np.concatenate([probes, queries.astype("f8")])
+    winding = mesh_winding_numbers(vertices, faces, places)
     # Close behind a sheet without thickness it is about one half.
     enclosed = float((winding[: len(probes)] > 0.6).mean())
     if enclosed < LEAST_ENCLOSED:
