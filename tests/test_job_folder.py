@@ -37,7 +37,7 @@ def transferred(untrained):
 def folder(transferred, tmp_path_factory):
     folder = tmp_path_factory.mktemp("job")
     origin = {"command": "nrdf transfer <x>", "model": {"name": "chair"}, "knowledge": "k.yaml"}
-    write_transfer(folder, transferred, Limits(min_coverage=1.01), "new & <old>", origin)
+    write_transfer(folder, transferred, Limits(max_cycle_time_s=0.0), "new & <old>", origin)
     return folder
 
 

@@ -124,9 +124,9 @@ def test_a_direction_is_in_the_targets_frame(model):
 
 def test_a_region_that_is_not_there_is_skipped_never_invented(model):
     taught = Teacher(lesson({"top": [SAND, OIL], "right": [SAND]}), model)
-    result = taught.transfer(cloud(seed=1), min_confidence=1.01)
+    result = taught.transfer(cloud(seed=1), min_confidence=1.0)
     assert all(step.path is None and step.measures is None for step in result.paths)
-    assert "below 1.01" in result.regions["top"].missing
+    assert ", below 1" in result.regions["top"].missing
     assert len(result.warnings) == 2
     assert result.warnings[0].startswith("region 'top' is skipped: confidence ")
 

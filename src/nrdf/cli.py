@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import logging
 import os
 import re
 import sys
+import typing
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -129,7 +131,7 @@ def _parse(given: list[str]) -> int | None:
         known, prog, description = group(), f"nrdf {given[0]}", inspect.getdoc(group)
         given = given[1:]
     return tyro.extras.subcommand_cli_from_dict(
-        {name: _with_joined_lines(verb) for name, verb in known.items()},
+        {name: _with_checked_numbers(_with_joined_lines(verb)) for name, verb in known.items()},
         prog=prog,
         description=description,
         args=given,
@@ -169,6 +171,24 @@ def _with_joined_lines(verb: Callable[..., Any]) -> Callable[..., Any]:
     """The verb, its docstring's arguments on one line each: tyro would keep the line breaks."""
     verb.__doc__ = re.sub(r"\n {12}", " ", verb.__doc__ or "")
     return verb
+
+
+def _with_checked_numbers(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """The verb, called only with numbers that are within its annotations' bounds."""
+    from nrdf.bounds import check_numbers
+
+    @functools.wraps(verb)
+    def checked(*given: Any, **named: Any) -> Any:
+        values = inspect.signature(verb).bind(*given, **named).arguments
+        hints = typing.get_type_hints(verb, include_extras=True)
+        flags = {name: f"--{name.replace('_', '-')}" for name in values}
+        check_numbers(
+            {flags[name]: value for name, value in values.items()},
+            {flags[name]: hints[name] for name in values},
+        )
+        return verb(*given, **named)
+
+    return checked
 
 
 def _complain(message: str) -> None:

@@ -30,7 +30,7 @@ class DataError(NrdfError):
 
 
 class ConfigError(NrdfError):
-    """An unknown preset, option or value in a configuration file."""
+    """An unknown preset, option or value, on the command line or in a configuration file."""
 
 
 class TrainingError(NrdfError):

@@ -8,6 +8,7 @@ from typing import Literal
 
 from tyro.conf import Positional
 
+from nrdf.bounds import Count
 from nrdf.commands.console import command_line, console, progress_bar, versions
 
 Variant = Literal["complete", "cd", "emd", "ncd", "ds", "dd"]
@@ -21,9 +22,9 @@ def ablate(
     only: tuple[Variant, ...] = ("complete", "cd", "emd", "ncd", "ds", "dd"),
     bsrc: Path | None = None,
     labels: Literal["published", "corrected"] = "published",
-    pairs: int = 20,
+    pairs: Count = 20,
     device: str = "auto",
-    workers: int | None = None,
+    workers: Count | None = None,
     out: Path | None = None,
     overwrite: bool = False,
 ) -> None:

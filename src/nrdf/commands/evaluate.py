@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from nrdf.bounds import Count, CountFromZero
 from nrdf.commands.console import (
     command_line,
     console,
@@ -58,7 +59,7 @@ def bsrc(
     labels: Literal["published", "corrected"] = "published",
     metric: str = "cd-l1",
     device: str = "cpu",
-    workers: int | None = None,
+    workers: Count | None = None,
     overwrite: bool = False,
 ) -> None:
     """The paper's Table II: regions found on the benchmark's scans.
@@ -149,7 +150,7 @@ def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) 
 def families(
     category: Literal["chair", "car", "plane", "table"],
     model: str | None = None,
-    pairs: int = 50,
+    pairs: Count = 50,
     device: str = "cpu",
 ) -> None:
     """The field against the exact truth of the parametric families.
@@ -186,8 +187,8 @@ def families(
 def bench(
     preset: tuple[str, ...] = ("default", "paper"),
     device: str = "cpu",
-    repeats: int = 7,
-    steps: int = 3,
+    repeats: Count = 7,
+    steps: CountFromZero = 3,
     robot: Path | None = None,
     out: Path | None = None,
 ) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
+from nrdf.bounds import Count
 from nrdf.commands.console import console, progress_bar, show, table
 
 
 def carry(
     category: Literal["chair", "car", "plane", "table"],
     model: str | None = None,
-    pairs: int = 50,
+    pairs: Count = 50,
     device: str = "cpu",
 ) -> None:
     """Carried waypoints against the exact truth of the parametric families.

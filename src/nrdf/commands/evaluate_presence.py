@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from nrdf.bounds import Count
 from nrdf.commands.console import console, progress_bar, show, table
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 def presence(
     out: Path,
     category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
-    pairs: int = 25,
+    pairs: Count = 25,
     device: str = "cpu",
 ) -> None:
     """Fit what tells absent regions, on scans of family members.

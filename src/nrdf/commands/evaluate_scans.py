@@ -5,16 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from nrdf.bounds import Count, CountFromZero
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
 
 
 def scans(
     category: Literal["chair", "car", "plane"],
     model: str | None = None,
-    members: int = 25,
+    members: CountFromZero = 25,
     meshes: Path | None = None,
-    every: int = 1,
-    pairs: int = 25,
+    every: Count = 1,
+    pairs: CountFromZero = 25,
     device: str = "cpu",
     out: Path | None = None,
 ) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
+from nrdf.bounds import Count, Share, Within
 from nrdf.commands.console import command_line, console, progress_bars, versions
 
 
@@ -15,11 +16,11 @@ def shape(
     model: tuple[str, ...] = (),
     runs: Path = Path("runs"),
     split: Literal["test", "val", "train"] = "test",
-    level: float = 0.75,
-    resolution: int = 64,
-    points: int = 8192,
+    level: Share = 0.75,
+    resolution: Annotated[int, Within(2, 1024)] = 64,
+    points: Count = 8192,
     device: str = "cpu",
-    workers: int | None = None,
+    workers: Count | None = None,
     out: Path | None = None,
 ) -> None:
     """The paper's Table I: surface and occupancy of shapes not trained on.

@@ -5,15 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from nrdf.bounds import CountFromZero, NotNegative
 from nrdf.commands.console import console, progress_bar, show, table
 
 
 def toolpaths(
     category: Literal["chair", "car", "plane", "table"],
     data: Path | None = None,
-    members: int = 10,
+    members: CountFromZero = 10,
     trajectory: Literal["raster", "cross-hatch", "spiral", "contour"] = "raster",
-    edge_margin_mm: float = 0.0,
+    edge_margin_mm: NotNegative = 0.0,
 ) -> None:
     """Tool paths planned on known regions, measured.
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
+from nrdf.bounds import FINITE
 from nrdf.commands.console import console, show, table, versions
 from nrdf.errors import ConfigError
 
@@ -117,6 +118,7 @@ def _parse_scores(words: tuple[str, ...]) -> dict[str, float]:
         name, _, value = word.partition("=")
         try:
             scores[name] = float(value)
+            FINITE.check(f"the score {name}", scores[name])
         except ValueError:
             raise ConfigError(f"a score is name=value with a number, not '{word}'") from None
     return scores

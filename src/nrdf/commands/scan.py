@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
+from nrdf.bounds import NotNegative, Positive, Seed, Within
 from nrdf.commands.console import command_line, console
 
 
 def scan(
     mesh: Positional[Path],
     out: Path,
-    views: int = 3,
-    noise: float = 0.0,
-    quantisation: float = 0.0,
-    grazing: float = 15.0,
-    distance: float = 2.0,
-    pixels: int = 240,
+    views: Annotated[int, Within(1, 1000)] = 3,
+    noise: NotNegative = 0.0,
+    quantisation: NotNegative = 0.0,
+    grazing: Annotated[float, Within(0.0, 90.0)] = 15.0,
+    distance: Positive = 2.0,
+    pixels: Annotated[int, Within(1, 4096)] = 240,
     floor: bool = False,
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z",
     yaw: float | None = None,
-    scale: float = 1.0,
+    scale: Positive = 1.0,
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     unit: Literal["m", "cm", "mm", "in"] | None = None,
     normals: bool = False,
-    seed: int = 0,
+    seed: Seed = 0,
 ) -> None:
     """Simulate depth cameras around a mesh.
 
@@ -65,8 +66,6 @@ def scan(
     from nrdf.scans.simulate import ScanSettings, simulate_scan
     from nrdf.similarity import Similarity, about_up, up_axis, upright
 
-    if not scale > 0:
-        raise DataError(f"--scale {scale:g} must be above 0")
     if out.suffix.lower() != ".ply":
         raise DataError(f"--out {out} must end in .ply")
     rng = np.random.default_rng(seed)

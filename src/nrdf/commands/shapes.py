@@ -7,15 +7,16 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from nrdf.bounds import Count, Seed
 from nrdf.commands.console import console, errors, progress_bar
 
 
 def synth(
     category: Positional[str],
-    count: int,
+    count: Count,
     out: Path,
-    seed: int = 0,
-    workers: int | None = None,
+    seed: Seed = 0,
+    workers: Count | None = None,
 ) -> None:
     """Make parametric training shapes: chair, car, plane or table.
 
@@ -43,10 +44,10 @@ def prepare(
     category: str,
     out: Path,
     index: Path | None = None,
-    surface_points: int = 8192,
-    queries: int = 16384,
-    seed: int = 0,
-    workers: int | None = None,
+    surface_points: Count = 8192,
+    queries: Count = 16384,
+    seed: Seed = 0,
+    workers: Count | None = None,
     overwrite: bool = False,
 ) -> int:
     """Make training shapes from meshes of any quality.
@@ -85,7 +86,12 @@ def prepare(
 
 
 def boxes(
-    file: Positional[Path], category: str, count: int, out: Path, seed: int = 0, licence: str = ""
+    file: Positional[Path],
+    category: str,
+    count: Count,
+    out: Path,
+    seed: Seed = 0,
+    licence: str = "",
 ) -> None:
     """Make training shapes of objects given as oriented boxes.
 
@@ -111,10 +117,10 @@ def boxes(
 
 def correspond(
     data: Positional[tuple[Path, ...]],
-    templates: int = 12,
+    templates: Count = 12,
     templates_from: Path | None = None,
     meshes: Path | None = None,
-    workers: int | None = None,
+    workers: Count | None = None,
 ) -> None:
     """Add correspondences between shapes, by registering templates.
 

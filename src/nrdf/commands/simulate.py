@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
+from nrdf.bounds import FINITE, Count, NotNegative, Seed
 from nrdf.commands.console import command_line, console, errors, progress_bar, show, table, versions
 
 
@@ -16,13 +17,13 @@ def simulate(
     robot: Path | None = None,
     tool_frame: str | None = None,
     base: tuple[str, ...] = ("auto",),
-    stand: float = 0.0,
-    turns: int | None = None,
+    stand: NotNegative = 0.0,
+    turns: Count | None = None,
     mesh: Path | None = None,
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "y",
     shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
     pictures: bool = True,
-    seed: int = 0,
+    seed: Seed = 0,
     overwrite: bool = False,
 ) -> None:
     """Drive a job on a robot arm in simulation.
@@ -85,12 +86,12 @@ def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[
     from nrdf.errors import RobotError
     from nrdf.robot.cell import Placement
 
-    if turns is not None and turns < 1:
-        raise RobotError(f"--turns is {turns}; give 1 or more")
     if base == ("auto",):
         return None, turns or 12
     try:
         x, y, z = (float(value) for value in base)
+        for value in (x, y, z):
+            FINITE.check("--base", value)
     except ValueError:
         raise RobotError(
             f"--base is '{' '.join(base)}'; give auto, or three numbers: x y z in metres"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
+from nrdf.bounds import Within
 from nrdf.commands.console import command_line, console, errors, versions
 
 
 def studio(
     session: Path = Path("studio"),
     host: str = "127.0.0.1",
-    port: int = 8080,
+    port: Annotated[int, Within(1, 65535)] = 8080,
     no_browser: bool = False,
     device: str = "cpu",
     robot: Path | None = None,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional
 
+from nrdf.bounds import NotNegative, Share, Within
 from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, stand_ins
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
 
@@ -26,12 +27,12 @@ def transfer(
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
     region: tuple[Path, ...] = (),
-    min_confidence: float | None = None,
-    min_coverage: float | None = None,
-    max_line_spacing_mm: float | None = None,
-    max_surface_distance_mm: float | None = None,
-    max_axis_error_deg: float | None = None,
-    max_cycle_time_s: float | None = None,
+    min_confidence: Share | None = None,
+    min_coverage: Share | None = None,
+    max_line_spacing_mm: NotNegative | None = None,
+    max_surface_distance_mm: NotNegative | None = None,
+    max_axis_error_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
+    max_cycle_time_s: NotNegative | None = None,
     require_all: bool = False,
     strict: bool = False,
     device: str = "cpu",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from nrdf.bounds import Count, Seed
 from nrdf.commands.console import console, progress_bar
 
 
@@ -13,8 +14,8 @@ def yaw(
     category: Positional[str],
     data: tuple[Path, ...],
     out: Path,
-    steps: int = 1000,
-    seed: int = 0,
+    steps: Count = 1000,
+    seed: Seed = 0,
     overwrite: bool = False,
 ) -> None:
     """Train what tells which way scans of a category face; alignment uses it.

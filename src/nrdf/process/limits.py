@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nrdf.bounds import FROM_ZERO, SHARE
 from nrdf.process.coverage import Measures
 from nrdf.process.transfer import FoundRegion, Transferred
 from nrdf.regions.presence import ABSENT
@@ -37,7 +38,10 @@ def _doubt(region: FoundRegion) -> str:
 
 @dataclass(frozen=True)
 class Limits:
-    """None where there is no limit. SI, of each tool path; the cycle time is that of all."""
+    """None where there is no limit. SI, of each tool path; the cycle time is that of all.
+
+    Raises ConfigError for a limit that is not finite, below 0, or a share above 1.
+    """
 
     min_coverage: float | None = None
     max_line_spacing_m: float | None = None
@@ -45,6 +49,11 @@ class Limits:
     max_axis_error_rad: float | None = None
     max_cycle_time_s: float | None = None
     require_all: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value is not None:
+                (SHARE if name == "min_coverage" else FROM_ZERO).check(name, value)
 
     def broken(self, transferred: Transferred) -> list[str]:
         """A line for each limit that is not met: by which region and process, and by how much."""

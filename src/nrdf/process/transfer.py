@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from nrdf.bounds import SHARE
 from nrdf.cloud import PointCloud, in_metres
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.output import output_folder
@@ -144,8 +145,10 @@ class Teacher:
         told (done, all) steps. doubts: what is doubtful about the target's pose and unit; unless
         given, its unit is judged here, and logged as a warning where it is doubtful. Raises
         CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
-        RegionError for a marked region that is not taught or not on the target.
+        RegionError for a marked region that is not taught or not on the target, ConfigError for a
+        `min_confidence` that is no share.
         """
+        SHARE.check("min_confidence", min_confidence)
         start = time.perf_counter()
         if isinstance(target, Embedded):
             embedded = self.taught.facing(self.lesson.regions, target)

@@ -1,0 +1,71 @@
+"""What a number may be: one check for options, limits and settings, which NaN never passes."""
+
+from __future__ import annotations
+
+import math
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from nrdf.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Within:
+    """From `least` to `most`; `above`: not `least` itself. Always finite.
+
+    Stands in annotations, `Annotated[float, Within(0.0, 1.0)]`, where `check_numbers` finds it.
+    """
+
+    least: float = -math.inf
+    most: float = math.inf
+    above: bool = False
+
+    def check(self, name: str, value: float) -> None:
+        """Raise ConfigError, with name and value, unless a number is within."""
+        finite = isinstance(value, int) or math.isfinite(value)
+        good = self.least < value if self.above else self.least <= value
+        if not (finite and good and value <= self.most):
+            shown = value if isinstance(value, int) else f"{value:g}"
+            raise ConfigError(f"{name} {shown} must be {self.words}")
+
+    @property
+    def words(self) -> str:
+        if self.most < math.inf:
+            from_ = "above" if self.above else "from"
+            return f"{from_} {self.least:g} to {self.most:g}"
+        if self.least > -math.inf:
+            return f"above {self.least:g}" if self.above else f"{self.least:g} or more"
+        return "a finite number"
+
+
+FINITE = Within()
+SHARE = Within(0.0, 1.0)
+FROM_ZERO = Within(0.0)
+
+Share = Annotated[float, SHARE]
+NotNegative = Annotated[float, FROM_ZERO]
+Positive = Annotated[float, Within(0.0, above=True)]
+Count = Annotated[int, Within(1)]
+CountFromZero = Annotated[int, FROM_ZERO]
+Seed = Annotated[int, FROM_ZERO]
+
+
+def check_numbers(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
+    """Check every number among `values`, those in tuples too, by its `Within` in the annotations.
+
+    Numbers without one must be finite. Raises ConfigError, with name and value, for the first that
+    is not.
+    """
+    for name, value in values.items():
+        bounds = next(_bounds_in(hints.get(name)), FINITE)
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, (int, float)) and not isinstance(number, bool):
+                bounds.check(name, number)
+
+
+def _bounds_in(hint: Any) -> Iterator[Within]:
+    yield from (m for m in getattr(hint, "__metadata__", ()) if isinstance(m, Within))
+    for inner in typing.get_args(hint):
+        yield from _bounds_in(inner)
