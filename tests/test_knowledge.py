@@ -203,7 +203,7 @@ def test_a_missing_file_and_one_that_is_no_text(tmp_path):
 def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(knowledge_file, "_LARGEST_FILE", 10)
     (tmp_path / "k.yaml").write_text("category: chair")
-    with pytest.raises(ProcessError, match="is larger than"):
+    with pytest.raises(ProcessError, match="has more than"):
         read_knowledge(tmp_path / "k.yaml")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 Location = tuple[int | str, ...]
-_LONGEST_VALUE = 60
+_LONGEST_VALUE, _LONGEST_PLACE = 60, 200
 _WORDS = {
     "missing": "is missing",
     "greater_than": "must be above {gt}",
@@ -48,12 +48,14 @@ def explain(
     error: ValidationError,
     model: type[BaseModel],
     place: Callable[[Location], str] = lambda location: ".".join(map(str, location)),
+    most: int | None = None,
 ) -> list[str]:
     """Each complaint as place, fault and value; for an unknown key the nearest known one.
 
     `model` is what was validated; `place` puts a location (keys and list positions) into words.
+    most: only so many, of the first.
     """
-    return [_line(dict(item), model, place) for item in error.errors(include_url=False)]
+    return [_line(dict(item), model, place) for item in error.errors(include_url=False)[:most]]
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
@@ -66,20 +68,22 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 def _line(item: dict[str, Any], model: type[BaseModel], place: Callable[[Location], str]) -> str:
     location: Location = item["loc"]
+    where = _cut(place(location), _LONGEST_PLACE)
     if item["type"] == "extra_forbidden":
         keys = _keys_at(model, location[:-1])
-        return f"unknown key '{place(location)}'{nearest(str(location[-1]), keys)}"
+        return f"unknown key '{where}'{nearest(str(location[-1]), keys)}"
     words = _WORDS.get(item["type"], item["msg"].removeprefix("Value error, "))
     words = words.format(**item.get("ctx", {})) if item["type"] in _WORDS else words
     value = item["input"]
     plain = isinstance(value, (str, int, float, bool, type(None)))
     if item["type"] != "missing" and plain and not item["type"].startswith("json"):
-        shown = repr(value)
-        if len(shown) > _LONGEST_VALUE:
-            shown = shown[: _LONGEST_VALUE - 4] + " ..."
+        shown = _cut(repr(value), _LONGEST_VALUE)
         words += f", not {shown}" if item["type"] in _WORDS else f" (it is {shown})"
-    where = place(location)
     return f"{where}: {words}" if where else words
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 4] + " ..."
 
 
 def _keys_at(model: type[BaseModel], location: Location) -> list[str]:

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Hashable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
 from nrdf.errors import ProcessError
+from nrdf.files import read_file
+from nrdf.plain_data import read_json, read_yaml
 from nrdf.ply import write_atomically
 from nrdf.process.knowledge import VERSION, Knowledge
 from nrdf.process.knowledge_text import to_yaml
 from nrdf.strict import Location, explain
 
 _LARGEST_FILE = 1 << 27
-_MOST_VALUES = 20_000_000
-"""A file's values, those behind YAML's aliases counted as often as they are used."""
 _MOST_FAULTS = 12
 
 
@@ -31,15 +29,10 @@ def read_knowledge(path: str | Path) -> Knowledge:
     unknown key, the nearest known one.
     """
     path = Path(path)
+    if not path.exists():
+        raise ProcessError(f"no knowledge file {path}; `nrdf knowledge new` writes one")
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise ProcessError(f"{path} is larger than {_LARGEST_FILE >> 20} MiB")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProcessError(
-            f"cannot read the knowledge file {path}: {error.strerror or error}; "
-            "`nrdf knowledge new` writes one"
-        ) from None
+        text = read_file(path, ProcessError, _LARGEST_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ProcessError(f"{path} is no text in UTF-8: {error}") from None
     return parse_knowledge(text, str(path), as_json=path.suffix.lower() == ".json")
@@ -50,9 +43,8 @@ def parse_knowledge(text: str, origin: str, as_json: bool = False) -> Knowledge:
     does."""
     kind = "JSON" if as_json else "YAML"
     try:
-        content = json.loads(text) if as_json else yaml.load(text, Loader=_Loader)
-        _check_size(content)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        content = read_json(text) if as_json else read_yaml(text)
+    except ValueError as error:
         raise ProcessError(f"{origin} is not valid {kind}: {error}") from None
     if not isinstance(content, dict):
         raise ProcessError(f"{origin} must hold a mapping (category: …, reference: …, regions: …)")
@@ -70,18 +62,20 @@ def validated(content: dict[str, Any], origin: str) -> Knowledge:
     try:
         return Knowledge.model_validate(content)
     except ValidationError as error:
-        faults = explain(error, Knowledge, lambda location: _place(location, content))
-        raise ProcessError(listed(origin, faults)) from None
+        place = partial(_place, content=content)
+        faults = explain(error, Knowledge, place, _MOST_FAULTS)
+        raise ProcessError(listed(origin, faults, error.error_count())) from None
 
 
-def listed(origin: str, faults: list[str]) -> str:
-    """One message of several faults, a line each."""
-    if len(faults) == 1:
+def listed(origin: str, faults: list[str], count: int | None = None) -> str:
+    """One message of several faults, a line each; `count`: of all, where some are not given."""
+    count = count or len(faults)
+    if count == 1:
         return f"{origin}: {faults[0]}"
     shown = faults[:_MOST_FAULTS]
-    if len(faults) > len(shown):
-        shown.append(f"and {len(faults) - len(shown)} more")
-    return "\n  ".join([f"{origin}: {len(faults)} faults:", *shown])
+    if count > len(shown):
+        shown.append(f"and {count - len(shown)} more")
+    return "\n  ".join([f"{origin}: {count} faults:", *shown])
 
 
 def write_knowledge(path: str | Path, knowledge: Knowledge, explained: bool = False) -> None:
@@ -105,18 +99,19 @@ def _place(location: Location, content: dict[str, Any]) -> str:
     at: Any = content
     rest = list(location)
     while len(rest) >= 2 and rest[0] in ("regions", "processes", "waypoints"):
-        name, number = rest[0], rest[1]
+        kind_of, number = rest[0], rest[1]
         if not isinstance(number, int):
             break
         try:
-            at = at[name][number]
+            at = at[kind_of][number]
         except (KeyError, IndexError, TypeError):
             at = None
         known = at if isinstance(at, dict) else {}
-        if name == "regions":
-            words.append(f"region '{known['name']}'" if "name" in known else f"region {number + 1}")
-        elif name == "processes":
-            kind = f" ({known['kind']})" if "kind" in known else ""
+        if kind_of == "regions":
+            name = known.get("name")
+            words.append(f"region '{name}'" if isinstance(name, str) else f"region {number + 1}")
+        elif kind_of == "processes":
+            kind = f" ({known['kind']})" if isinstance(known.get("kind"), str) else ""
             words.append(f"process {number + 1}{kind}")
         else:
             words.append(f"line {number + 1}")
@@ -124,44 +119,3 @@ def _place(location: Location, content: dict[str, Any]) -> str:
     if rest:
         words.append(".".join(map(str, rest)))
     return ", ".join(words)
-
-
-def _check_size(content: Any) -> None:
-    """Raise ValueError for content that aliases blow up, or that contains itself."""
-    sizes: dict[int, int] = {}
-    open_now: set[int] = set()
-
-    def size(value: Any) -> int:
-        if not isinstance(value, (dict, list)):
-            return 1
-        if id(value) in open_now:
-            raise ValueError("an alias (*name) stands within its own anchor (&name)")
-        if id(value) not in sizes:
-            open_now.add(id(value))
-            items = value.values() if isinstance(value, dict) else value
-            sizes[id(value)] = 1 + sum(map(size, items))
-            open_now.remove(id(value))
-        return sizes[id(value)]
-
-    if size(content) > _MOST_VALUES:
-        raise ValueError(f"more than {_MOST_VALUES} values, aliases included")
-
-
-class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """YAML without its traps: 1e-3 is a number, and a key that occurs twice is an error."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen: set[str] = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen and key.value != "<<":
-                line = key.start_mark.line + 1
-                raise yaml.YAMLError(f"the key '{key.value}' occurs twice, again in line {line}")
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)  # type: ignore[no-any-return]
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"),
-    list("-+.0123456789"),
-)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import yaml
 from pydantic import BaseModel
 
+from nrdf.plain_data import to_yaml_line
 from nrdf.process.knowledge import Knowledge
 from nrdf.units import OTHER_UNITS, in_words
 
@@ -103,10 +103,4 @@ def _plain(value: Any) -> str:
         return repr(float(f"{value:.10g}"))
     if isinstance(value, bool):
         return "true" if value else "false"
-    return (
-        yaml.safe_dump(
-            value, default_flow_style=True, allow_unicode=True, width=float("inf"), sort_keys=False
-        )
-        .removesuffix("\n...\n")
-        .strip()
-    )
+    return to_yaml_line(value)

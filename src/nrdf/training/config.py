@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-import yaml
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from nrdf.errors import ConfigError
+from nrdf.files import read_file
+from nrdf.plain_data import read_yaml
 from nrdf.strict import Strict, explain, nearest
 
 
@@ -128,6 +129,7 @@ class TrainConfig(Strict):
     log_every: int = Field(default=20, ge=1)
 
 
+_LARGEST_FILE = 1 << 20
 CONFIG_FOLDER = Path(__file__).resolve().parents[1] / "configs"
 
 
@@ -149,8 +151,8 @@ def load_config(source: str | Path | Mapping[str, Any]) -> TrainConfig:
             f"no configuration file '{source}'; give a YAML file or one of: {', '.join(known)}"
         )
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        content = read_yaml(read_file(path, ConfigError, _LARGEST_FILE).decode("utf-8-sig"))
+    except ValueError as error:
         raise ConfigError(f"{path} is not valid YAML: {error}") from None
     if not isinstance(content, dict):
         raise ConfigError(f"{path} must hold a mapping (preset: …, stages: […], …)")
