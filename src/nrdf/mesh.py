@@ -25,10 +25,12 @@ _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's ow
 
 @dataclass(frozen=True)
 class Skin:
-    """Points (n, 3) of a mesh that are seen from outside, with outward unit normals (n, 3)."""
+    """Points (n, 3) of a mesh that are seen from outside, with outward unit normals (n, 3), and the
+    face (n,) that each lies on."""
 
     points: np.ndarray
     normals: np.ndarray
+    face: np.ndarray
 
 
 def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
@@ -91,6 +93,13 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     Without this a face that is given twice, once for each side, cancels itself: the winding number
     is 0 on both sides. Raises DataError if no face is left.
     """
+    return clean_faces(vertices, faces)[:2]
+
+
+def clean_faces(
+    vertices: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `clean` gives, and which of the faces (f,) are left: (k,), ascending."""
     used, faces = np.unique(faces, return_inverse=True)
     vertices = vertices[used]
     extent = float(np.ptp(vertices, axis=0).max())
@@ -106,14 +115,15 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
-    faces = faces[area > 1e-14 * extent**2]
+    kept = np.flatnonzero(area > 1e-14 * extent**2)
+    faces = faces[kept]
     if len(faces) == 0:
         raise DataError("the mesh has no surface: no face has an area")
     low, middle, high = np.sort(faces, axis=1).T
     count = np.uint64(len(vertices))
     key = (low.astype(np.uint64) * count + middle.astype(np.uint64)) * count
-    once = np.unique(key + high.astype(np.uint64), return_index=True)[1]
-    return vertices, faces[np.sort(once)]
+    once = np.sort(np.unique(key + high.astype(np.uint64), return_index=True)[1])
+    return vertices, faces[once], kept[once]
 
 
 def outer_skin(
@@ -164,7 +174,7 @@ def outer_skin(
     turned = np.where(inward[face[skin]], -1.0, 1.0)
     clear = np.abs(vote[skin]) > _CLEAR_VOTE
     sign = np.where(clear, np.sign(vote[skin]), turned)
-    return faces, Skin(points[skin], sign[:, None] * normals[skin])
+    return faces, Skin(points[skin], sign[:, None] * normals[skin], face[skin])
 
 
 def _patches(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

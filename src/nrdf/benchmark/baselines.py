@@ -40,10 +40,7 @@ class Copied:
     ) -> dict[str, np.ndarray]:
         points = reference.points
         if self.box:
-            low, high = bounding_box(points)
-            target_low, target_high = bounding_box(target.points)
-            extent = np.maximum(high - low, 1e-12)
-            points = (points - low) / extent * (target_high - target_low) + target_low
+            points = _in_box(points, target.points)
         chosen = _all_indices(reference, regions)
         asked = np.concatenate(list(chosen.values()))
         weight = self.weight * canonical_transform(target.points)[1]
@@ -59,6 +56,18 @@ class Copied:
         if not self.weight:
             return np.zeros_like(cloud.points)
         return _hidden_point_normals(cloud.points.tobytes())
+
+
+class Boxed:
+    """The reference in the target's bounding box, which takes the regions as masks: each target
+    point is in a region if most of the reference's points nearest to it are, in position and
+    normal."""
+
+    def __call__(
+        self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud
+    ) -> dict[str, np.ndarray]:
+        (own, normals), (points, target_normals) = map(_canonical, (reference, target))
+        return _voted(reference, regions, _in_box(own, points), normals, points, target_normals)
 
 
 class Registered:
@@ -83,13 +92,7 @@ class Registered:
         template = self._last[1]
         points, normals = _canonical(target)
         mapped = template.map_surface(points, normals)
-        asked, _ = voters(mapped, template.normals, points, normals, NORMAL_WEIGHT, VOTERS)
-        found = {}
-        for name, indices in _all_indices(reference, regions).items():
-            member = np.zeros(len(reference.points), bool)
-            member[indices] = True
-            found[name] = np.flatnonzero(member[asked].mean(axis=1) > 0.5)
-        return found
+        return _voted(reference, regions, mapped, template.normals, points, normals)
 
 
 class _Template:
@@ -131,7 +134,7 @@ def hidden_point_normals(points: np.ndarray) -> np.ndarray:
     return np.where(votes < 0.0, -1.0, 1.0)[:, None] * lines
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _hidden_point_normals(points: bytes) -> np.ndarray:
     """The normals of the latest clouds are kept: they take a second, and each is in many pairs."""
     return hidden_point_normals(np.frombuffer(points).reshape(-1, 3))
@@ -144,6 +147,33 @@ def _visible_from(points: np.ndarray, viewpoint: np.ndarray) -> np.ndarray:
     flipped = offset + 2 * (_SPHERE * distance.max() - distance) * offset / distance
     corners = ConvexHull(np.concatenate([flipped, np.zeros((1, 3))])).vertices
     return corners[corners < len(points)]
+
+
+def _in_box(points: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Points (n, 3) after their bounding box was brought onto that of a target (m, 3)."""
+    low, high = bounding_box(points)
+    target_low, target_high = bounding_box(target)
+    extent = np.maximum(high - low, 1e-12)
+    return (points - low) / extent * (target_high - target_low) + target_low
+
+
+def _voted(
+    reference: PointCloud,
+    regions: Mapping[str, Any],
+    mapped: np.ndarray,
+    mapped_normals: np.ndarray,
+    points: np.ndarray,
+    normals: np.ndarray,
+) -> dict[str, np.ndarray]:
+    """A target's points (m, 3) of which most of the nearest mapped points (n, 3) are in a region,
+    by name."""
+    asked, _ = voters(mapped, mapped_normals, points, normals, NORMAL_WEIGHT, VOTERS)
+    found = {}
+    for name, indices in _all_indices(reference, regions).items():
+        member = np.zeros(len(reference.points), bool)
+        member[indices] = True
+        found[name] = np.flatnonzero(member[asked].mean(axis=1) > 0.5)
+    return found
 
 
 def _all_indices(reference: PointCloud, regions: Mapping[str, Any]) -> dict[str, np.ndarray]:

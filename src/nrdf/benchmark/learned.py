@@ -9,6 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
+from nrdf.regions.embedded import Embedded
+from nrdf.regions.match import Match
 from nrdf.regions.model import Model, Taught
 
 
@@ -29,11 +31,17 @@ class FieldMatch:
     def __call__(
         self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud
     ) -> dict[str, np.ndarray]:
-        if self._taught is None or self._taught.reference.cloud is not reference:
-            self._taught = self.model.set_reference(reference)
-        matches = self._taught.retrieve_all(regions, target, self.association, self.refine)
+        matches = self.find(reference, regions, target)
         self.confidence = {name: match.score for name, match in matches.items()}
         if self.association == "mask":
             return {name: match.indices for name, match in matches.items()}
         tree = cKDTree(target.points)
         return {name: tree.query(match.points)[1] for name, match in matches.items()}
+
+    def find(
+        self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud | Embedded
+    ) -> dict[str, Match]:
+        """All that retrieval says of each region."""
+        if self._taught is None or self._taught.reference.cloud is not reference:
+            self._taught = self.model.set_reference(reference)
+        return self._taught.retrieve_all(regions, target, self.association, self.refine)

@@ -46,6 +46,7 @@ METHODS = {
     "box": Entry("scaled to the target's bounding box, snapped"),
     "copy-normals": Entry("copy, snapped with oriented normals"),
     "box-normals": Entry("box, snapped with oriented normals"),
+    "box-mask": Entry("box, region as a mask"),
     "registration": Entry("smooth non-rigid registration with normals, region as a mask"),
     "ndf": Entry("NDF, nearest descriptor", "ndf", "ndf"),
     "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
@@ -100,12 +101,14 @@ def build_method(spec: MethodSpec) -> Match:
 
 @lru_cache(maxsize=2)
 def _build(spec: MethodSpec) -> Match:
-    from nrdf.benchmark.baselines import Copied, Registered
+    from nrdf.benchmark.baselines import Boxed, Copied, Registered
 
     entry = METHODS[spec.name]
     if not entry.is_learned:
         if spec.name == "registration":
             return Registered()
+        if spec.name == "box-mask":
+            return Boxed()
         return Copied(box=spec.name.startswith("box"), normals=spec.name.endswith("normals"))
     import nrdf
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from nrdf.benchmark import metrics
 from nrdf.benchmark.bsrc import Benchmark, BenchmarkObject
@@ -18,6 +18,7 @@ from nrdf.errors import OutputError
 from nrdf.ply import write_atomically
 
 log = logging.getLogger(__name__)
+Key = TypeVar("Key")
 
 FOLDER = "pairs"
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -46,11 +47,10 @@ class PairResult:
     confidence: dict[str, float]
 
 
-class PairStore:
-    """A folder of `pairs/<category>-<labels>-<method>.jsonl`, one line a pair.
+class LineStore:
+    """A folder `pairs` of files with one JSON object a line.
 
-    A line counts only if its fingerprint fits: of the method, its weights, the labels, both
-    objects' files, and the code that figures depend on. With `overwrite` none counts. Raises
+    A line counts only if its fingerprint is asked for; with `overwrite` none counts. Raises
     OutputError where the folder cannot be made or written.
     """
 
@@ -63,49 +63,63 @@ class PairStore:
                 f"cannot make {self.folder}: {error.strerror or error}; choose another --out"
             ) from error
 
+    def read(self, name: str, marks: Mapping[str, Key]) -> dict[Key, dict[str, Any]]:
+        """What the file `name` has of the fingerprints in `marks`, by what they stand for there;
+        other lines are taken out."""
+        path, kept = self.folder / name, {}
+        try:
+            there = path.exists() and not self.overwrite
+            lines = path.read_text(encoding="utf-8").splitlines() if there else []
+        except (OSError, ValueError) as error:
+            raise OutputError(f"cannot read {path}: {error}; delete it to start anew") from None
+        for line in lines:
+            try:
+                content = json.loads(line)
+                mark = content["fingerprint"]
+            except (ValueError, KeyError, TypeError):
+                continue  # cut off, or not ours
+            if isinstance(mark, str) and mark in marks:
+                kept[marks[mark]] = content
+        if path.exists():
+            write_atomically(path, [f"{json.dumps(line)}\n".encode() for line in kept.values()])
+        return kept
+
+    def append(self, name: str, mark: str, content: Mapping[str, Any]) -> None:
+        """Add a line."""
+        path = self.folder / name
+        try:
+            with open(path, "a", encoding="utf-8") as file:
+                file.write(json.dumps({"fingerprint": mark, **content}) + "\n")
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+class PairStore(LineStore):
+    """A folder of `pairs/<category>-<labels>-<method>.jsonl`, one line a pair.
+
+    A line counts only if its fingerprint fits: of the method, its weights, the labels, both
+    objects' files, and the code that figures depend on.
+    """
+
     def open(self, benchmark: Benchmark, spec: MethodSpec) -> dict[tuple[str, str], PairResult]:
         """The pairs of a method that are there, by (reference, target); others are taken out."""
-        path = self._path(benchmark, spec)
-        kept = {} if self.overwrite else self._read(path, benchmark, spec)
-        lines = [_line(*item) for item in kept.values()]
-        if path.exists() or lines:
-            write_atomically(path, [line.encode("utf-8") for line in lines])
+        marks = {
+            fingerprint(benchmark, spec, reference, target): (reference.name, target.name)
+            for reference, target in benchmark.pairs
+        }
+        lines = self.read(_file(benchmark, spec), marks)
+        parsed = {names: _parsed(line, benchmark.rois) for names, line in lines.items()}
+        kept = {names: result for names, result in parsed.items() if result is not None}
         if kept:
             count, total = len(kept), len(benchmark.pairs)
             log.info("%s: %d of %d pairs were there already", spec.name, count, total)
-        return {names: result for names, (_, result) in kept.items()}
+        return kept
 
     def add(self, benchmark: Benchmark, spec: MethodSpec, result: PairResult) -> None:
         """Append one pair."""
         items = {item.name: item for item in benchmark.objects}
         mark = fingerprint(benchmark, spec, items[result.reference], items[result.target])
-        path = self._path(benchmark, spec)
-        try:
-            with open(path, "a", encoding="utf-8") as file:
-                file.write(_line(mark, result))
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
-
-    def _path(self, benchmark: Benchmark, spec: MethodSpec) -> Path:
-        return self.folder / f"{benchmark.category}-{benchmark.labels}-{spec.name}.jsonl"
-
-    def _read(
-        self, path: Path, benchmark: Benchmark, spec: MethodSpec
-    ) -> dict[tuple[str, str], tuple[str, PairResult]]:
-        marks = {
-            fingerprint(benchmark, spec, reference, target): (reference.name, target.name)
-            for reference, target in benchmark.pairs
-        }
-        kept = {}
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-        except (OSError, ValueError) as error:
-            raise OutputError(f"cannot read {path}: {error}; delete it to start anew") from None
-        for line in lines:
-            mark, result = _parsed(line, benchmark.rois)
-            if mark in marks and result is not None:
-                kept[marks[mark]] = (mark, result)
-        return kept
+        self.append(_file(benchmark, spec), mark, asdict(result))
 
 
 def fingerprint(
@@ -120,23 +134,22 @@ def fingerprint(
 
 
 @cache
-def code_checksum() -> str:
-    """SHA-256 of the source files that figures depend on."""
+def code_checksum(sources: tuple[str, ...] = _SOURCES) -> str:
+    """SHA-256 of the source files (patterns within the package) that figures depend on."""
     digest = hashlib.sha256()
-    for pattern in _SOURCES:
+    for pattern in sources:
         for path in sorted(_PACKAGE.glob(pattern)):
             digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def _line(mark: str, result: PairResult) -> str:
-    return json.dumps({"fingerprint": mark, **asdict(result)}) + "\n"
+def _file(benchmark: Benchmark, spec: MethodSpec) -> str:
+    return f"{benchmark.category}-{benchmark.labels}-{spec.name}.jsonl"
 
 
-def _parsed(line: str, rois: tuple[str, ...]) -> tuple[str, PairResult | None]:
-    """A line's fingerprint and result; ("", None) for one that was cut off or is not ours."""
+def _parsed(content: Mapping[str, Any], rois: tuple[str, ...]) -> PairResult | None:
+    """A line's result; None for one that is not ours."""
     try:
-        content: Mapping[str, Any] = json.loads(line)
         figures = {
             roi: {name: _number(content["figures"][roi][name]) for name in metrics.METRICS}
             for roi in rois
@@ -144,10 +157,9 @@ def _parsed(line: str, rois: tuple[str, ...]) -> tuple[str, PairResult | None]:
         points = {roi: int(content["points"][roi]) for roi in rois}
         names = str(content["reference"]), str(content["target"])
         confidence = {roi: float(value) for roi, value in content["confidence"].items()}
-        result = PairResult(*names, float(content["seconds"]), points, figures, confidence)
-        return str(content["fingerprint"]), result
+        return PairResult(*names, float(content["seconds"]), points, figures, confidence)
     except (ValueError, KeyError, TypeError, AttributeError):
-        return "", None
+        return None
 
 
 def _number(value: Any) -> float | None:

@@ -27,12 +27,13 @@ if TYPE_CHECKING:
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Score: BSRC (bsrc), exact truth (families, carry, scans), shapes (shape), plans (toolpaths);
-    fit what tells absent regions (presence).
+    """Score: BSRC (bsrc), labelled meshes (objects), exact truth (families, carry, scans), shapes
+    (shape), plans (toolpaths); fit what tells absent regions (presence).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
     from nrdf.commands.evaluate_carry import carry
+    from nrdf.commands.evaluate_objects import objects
     from nrdf.commands.evaluate_presence import presence
     from nrdf.commands.evaluate_scans import scans
     from nrdf.commands.evaluate_shape import shape
@@ -40,6 +41,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
 
     return {
         "bsrc": bsrc,
+        "objects": objects,
         "families": families,
         "carry": carry,
         "scans": scans,
@@ -70,8 +72,9 @@ def bsrc(
     With --out also every other metric (docs/benchmark.md), as Markdown, CSV and JSON, and a
     picture; interrupted, the same command goes on where it was.
 
-    Methods: copy, box, copy-normals, box-normals, registration (nothing learned); ndf, ndf-energy,
-    imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default field).
+    Methods: copy, box, copy-normals, box-normals, box-mask, registration (nothing learned); ndf,
+    ndf-energy, imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default
+    field).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
