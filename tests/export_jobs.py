@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.process.toolpath import Job, Segment, ToolPath
+from nrdf.similarity import Similarity
 
 
 def wild_job(seed: int = 0) -> Job:
@@ -64,4 +65,6 @@ def small_job() -> Job:
             ToolPath("top", "sand", "disc 125", 0.0625, sanding, 400.0, {"grit": 120}),
             ToolPath("top", "inspect", "camera", 0.01, looking),
         ),
+        # Z up, Y ahead: the quaternion has no last bit to drift.
+        Similarity(np.eye(3)[[2, 0, 1]], np.array([0.13, 0.07, 0.4]), 0.06),
     )

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.process.coverage import measure
+from nrdf.process.given_surface import MeshSurface
 from nrdf.process.plan import Strategy, drive
 from nrdf.process.surface import Surface
 from surfaces import board, tube, two_sided
@@ -42,11 +43,88 @@ def test_overlap_is_the_share_that_is_passed_over_twice():
     assert found.overlap == pytest.approx(0.02 / 0.08, abs=0.05)
 
 
-def test_the_margin_need_not_be_covered():
+def test_the_margin_need_not_be_covered_and_is_said_to_be_left_out():
     narrow = lines(0.125, 0.175, x=(0.09, 0.31))
-    assert measure(SURFACE, REGION, STRATEGY, narrow).coverage < 0.3
-    inner = replace(STRATEGY, edge_margin_m=0.1)
-    assert measure(SURFACE, REGION, inner, narrow).coverage > 0.95
+    all_of_it = measure(SURFACE, REGION, STRATEGY, narrow)
+    assert all_of_it.coverage < 0.3 and all_of_it.unreached > 0.7
+    assert all_of_it.left_out == {"no_room": 0.0, "edge_margin": 0.0}
+    inner = measure(SURFACE, REGION, replace(STRATEGY, edge_margin_m=0.1), narrow)
+    assert inner.coverage == all_of_it.coverage  # of the whole region, whatever is left out
+    assert inner.unreached < 0.01
+    assert inner.left_out["edge_margin"] == pytest.approx(1 - 0.23, abs=0.03)
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.03])
+def test_worked_left_out_and_unreached_add_up_to_the_whole_region(margin):
+    found = measure(SURFACE, REGION, replace(STRATEGY, edge_margin_m=margin), lines(0.1, 0.13))
+    assert found.coverage + sum(found.left_out.values()) + found.unreached == pytest.approx(1.0)
+    assert (found.left_out["edge_margin"] > 0.2) == (margin > 0)
+
+
+def test_a_step_through_the_air_is_a_figure():
+    whole = lines(0.1)
+    (work,) = (s for s in whole if s.kind == "process")
+    assert measure(SURFACE, REGION, STRATEGY, whole).step_worst_m == pytest.approx(0.01)
+    kept = np.r_[0:11, 38:41]
+    jump = replace(
+        work, positions=work.positions[kept], quaternions_xyzw=work.quaternions_xyzw[kept]
+    )
+    assert measure(SURFACE, REGION, STRATEGY, [jump]).step_worst_m == pytest.approx(0.28)
+
+
+def test_the_largest_turn_between_waypoints_in_all_and_by_length():
+    (work,) = (s for s in lines(0.1) if s.kind == "process")
+    turned = np.tile(DOWN.as_quat(), (41, 1))
+    turned[20:] = (Rotation.from_euler("y", 0.6) * DOWN).as_quat()
+    turned[30:] = -turned[30:]  # the other sign is the same orientation
+    found = measure(SURFACE, REGION, STRATEGY, [replace(work, quaternions_xyzw=turned)])
+    assert found.turn_worst_rad == pytest.approx(0.6)
+    assert found.bend_worst_rad_m == pytest.approx(0.6 / 0.01)
+    # A spin about the tool's own axis is none.
+    spun = (DOWN * Rotation.from_euler("z", np.linspace(0, 3, 41)[:, None])).as_quat()
+    found = measure(SURFACE, REGION, STRATEGY, [replace(work, quaternions_xyzw=spun)])
+    assert found.turn_worst_rad == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_step_counts_where_the_tool_is_as_well_as_on_the_surface():
+    """0.1 m above the surface a tool that turns moves farther than the place that it faces."""
+    high = replace(STRATEGY, standoff_m=0.1)
+    (work,) = (s for s in lines(0.1, strategy=high) if s.kind == "process")
+    turns = Rotation.from_euler("y", np.where(np.arange(41) < 20, 0.0, 0.5)[:, None]) * DOWN
+    places = work.positions - 0.1 * turns.as_matrix()[:, :, 2]
+    found = measure(
+        SURFACE, REGION, high, [replace(work, positions=places, quaternions_xyzw=turns.as_quat())]
+    )
+    assert found.step_worst_m == pytest.approx(float(np.linalg.norm(places[20] - places[19])))
+    assert found.step_worst_m > 0.05
+
+
+def test_the_object_as_given_judges_what_the_plan_cannot_see():
+    """The plan's surface is 4 mm above the mesh: by itself it is without fault."""
+    mesh = MeshSurface(
+        np.array([[-1, -1, -4e-3], [2, -1, -4e-3], [0, 3, -4e-3]], float), [[0, 1, 2]]
+    )
+    found = measure(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)), mesh)
+    assert found.surface_distance_worst_m < 1e-6
+    assert found.true_distance_95_m == pytest.approx(4e-3)
+    assert found.true_distance_worst_m == pytest.approx(4e-3)
+    assert found.judged_by == "the mesh as given (1 triangles)"
+    alone = measure(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)))
+    assert alone.judged_by is None and alone.true_distance_worst_m is None
+
+
+def test_the_way_between_waypoints_is_judged_as_well():
+    """Both waypoints are on the valley's rims, the straight way between them is above it."""
+    rims = np.array(
+        [[0, -1, 0], [0, 1, 0], [0.2, -1, -0.1], [0.2, 1, -0.1], [0.4, -1, 0], [0.4, 1, 0]]
+    )
+    valley = MeshSurface(rims.astype(float), [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5]])
+    (work,) = (s for s in lines(0.1) if s.kind == "process")
+    ends = replace(
+        work, positions=work.positions[[0, -1]], quaternions_xyzw=work.quaternions_xyzw[:2]
+    )
+    found = measure(SURFACE, REGION, STRATEGY, [ends], valley)
+    assert found.true_distance_worst_m == pytest.approx(0.1 * np.cos(np.arctan(0.5)), rel=0.05)
 
 
 def test_the_other_side_of_a_thin_board_is_not_reached():

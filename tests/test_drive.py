@@ -14,7 +14,7 @@ if find_spec("mujoco") is None:
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.robot.arm import load_arm
-from nrdf.robot.cell import Cell, Placement
+from nrdf.robot.cell import Cell, Placement, upright_turn
 from nrdf.robot.drive import drive
 from nrdf.robot.follow import follow
 from nrdf.robot.inverse import Library
@@ -23,7 +23,7 @@ from nrdf.robot.program import find_home
 from nrdf.robot.solid import solid_from_points
 from nrdf.robot.tool import tool_of
 
-UP = np.array([0.0, 1.0, 0.0])
+UP = upright_turn(*np.eye(3)[[1, 0]])
 WALL = 0.10
 PLACE = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,))
 

@@ -130,6 +130,19 @@ def test_names_of_frame_tool_and_program_may_be_chosen(tmp_path):
     assert "Frame: fixture 2." in (tmp_path / "csv/polish_it.csv").read_text()
 
 
+@pytest.mark.parametrize("name", [name for name in FORMATS if name != "ros2-bag"])
+def test_a_header_says_how_the_object_lies_or_that_nothing_does(tmp_path, name):
+    for place, job, said in (
+        ("new", small_job(), "up for the object is 0.0000 0.0000 1.0000"),
+        ("early", replace(small_job(), pose=None), "does not say how the object lies"),
+    ):
+        (tmp_path / place).mkdir()
+        files = export_job(job, [name], tmp_path / place)[name]
+        text = " ".join((tmp_path / place / files[-1]).read_text().split())
+        text = text.replace(") (", " ").replace("$$ ", "").replace("# ", "").replace("; ", "")
+        assert said.lower() in text.lower()
+
+
 def test_each_tool_has_a_number(tmp_path):
     job = job_of(*(path_of(straight("process", 0, 9), tool=t) for t in ("a", "b", "a")))
     export_job(job, ["apt", "gcode"], tmp_path, Options(tool_number=3))
@@ -305,7 +318,7 @@ def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):
     for words in (["--format", "csv", "krk"], ["--format", "csv", "krl", "--program", "if"]):
         with pytest.raises(ProcessError):
             run(str(tmp_path), *words, "--out", str(tmp_path / "out"))
-    path.write_text(path.read_text().replace('"version":1', '"version":99'))
-    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 1"):
+    path.write_text(path.read_text().replace('"version":2', '"version":99'))
+    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 2"):
         run(str(tmp_path), "--format", "csv", "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]

@@ -62,6 +62,35 @@ def test_the_job_is_read_again(folder, transferred):
     assert job.paths[2].segments[1].force_n is None
 
 
+def test_the_job_says_how_its_object_lies(transferred, tmp_path):
+    """As for a scan that was given with z up: chairs must not lie on their side in the cell."""
+    lying = Similarity(upright(up_axis("z")), np.array([1.0, 2.0, 3.0]), 0.9)
+    report = write_transfer(tmp_path, replace(transferred, pose=lying), Limits(), "scan", {})
+    job = read_job(tmp_path)
+    np.testing.assert_allclose(job.pose.rotation, lying.rotation, atol=1e-12)
+    np.testing.assert_allclose(job.pose.translation, lying.translation)
+    assert job.pose.scale == 0.9
+    np.testing.assert_allclose(job.up, [0, 0, 1], atol=1e-12)
+    assert report["pose"] == json.loads((tmp_path / "toolpaths.json").read_text())["pose"]
+
+
+def test_processes_of_one_kind_on_one_region_keep_their_own_names(untrained, tmp_path):
+    """A path knows which of them made it, up to the job's own knowledge."""
+    wide = {**SAND, "stepover_mm": 45, "standoff_mm": 0, "feed_mm_s": 50}
+    eats_all = {**SAND, "edge_margin_mm": 400}
+    teacher = Teacher(lesson({"top": [eats_all, SAND, wide, PAINT]}), nrdf.load_model(untrained))
+    result = teacher.transfer(cloud(seed=1))
+    assert [step.process.label for step in result.paths] == ["sand", "sand 2", "sand 3", "paint"]
+    assert result.paths[0].path is None
+    write_transfer(tmp_path, result, Limits(), "twice", {})
+    made = read_lesson(tmp_path / "knowledge.yaml").knowledge.regions[0].processes
+    feeds = {process.label: process.feed_m_s for process in made}
+    assert feeds == {"sand 2": 0.1, "sand 3": 0.05, "paint": 0.3}
+    for path in read_job(tmp_path).paths:
+        work = [s for s in path.segments if s.kind == "process"]
+        assert {s.feed_m_s for s in work} == {feeds[path.process]}
+
+
 def test_the_targets_knowledge_is_as_good_as_the_taught_one(folder, transferred):
     again = read_lesson(folder / "knowledge.yaml")
     for name, indices in again.regions.items():

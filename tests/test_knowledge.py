@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from nrdf.errors import ProcessError
 from nrdf.process import knowledge_file, plan
-from nrdf.process.knowledge import Knowledge, Process, Reference, Trajectory
+from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Trajectory
 from nrdf.process.knowledge_file import parse_knowledge, read_knowledge, write_knowledge
 from nrdf.units import METRES
 
@@ -270,3 +270,17 @@ def test_names_are_those_of_the_planner_and_of_clouds():
         Reference.model_validate({"cloud": "a", "unit": "km"})
     for unit in METRES:
         assert Reference.model_validate({"cloud": "a", "unit": unit}).unit == unit
+
+
+def test_processes_of_one_label_are_told_apart():
+    sand = {"kind": "sand", "stepover_mm": 20, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
+    named = {**sand, "name": "sand 2"}
+    oil = {**sand, "kind": "oil"}
+    region = Region.model_validate(
+        {"name": "seat", "indices": [0], "processes": [sand, oil, sand, named, sand]}
+    )
+    assert [p.label for p in region.steps] == ["sand", "oil", "sand 3", "sand 2", "sand 4"]
+    assert [p.label for p in region.processes] == ["sand", "oil", "sand", "sand 2", "sand"]
+    long = {**sand, "name": "x" * 200}
+    region = Region.model_validate({"name": "seat", "indices": [0], "processes": [long, long]})
+    assert region.steps[1].name == "x" * 190 + " 2"

@@ -12,9 +12,16 @@ from taught_box import MEASURES, made_up
 @pytest.mark.parametrize(
     ("limit", "good", "bad", "message"),
     [
-        ("min_coverage", 0.99, 0.999, "the coverage is 0.995, below 0.999"),
+        ("min_coverage", 0.99, 0.999, "of the whole region is 0.995, below 0.999"),
         ("max_line_spacing_m", 0.045, 0.041, "worst line spacing is 42 mm, above 41 mm"),
-        ("max_surface_distance_m", 0.001, 0.0005, "from the surface is 0.9 mm, above 0.5 mm"),
+        (
+            "max_surface_distance_m",
+            0.0013,
+            0.0011,
+            "from the mesh as given (12 triangles) is 1.2 mm, above 1.1 mm",
+        ),
+        ("max_step_m", 0.022, 0.02, "largest step between waypoints is 21 mm, above 20 mm"),
+        ("max_turn_rad", 0.03, 0.01, "turn of the tool's axis between waypoints is 1.146°, above"),
         ("max_axis_error_rad", 0.02, 0.005, "(99th percentile) is 0.573°, above 0.2865°"),
         ("max_cycle_time_s", 60.0, 40.0, "the cycle time is 50.0 s, above 40 s"),
     ],
@@ -24,6 +31,20 @@ def test_each_limit_is_met_or_says_by_how_much_it_is_not(limit, good, bad, messa
     (line,) = Limits(**{limit: bad}).broken(made_up())
     assert message in line
     assert limit == "max_cycle_time_s" or line.startswith("region 'top', sand: ")
+
+
+def test_the_coverage_is_of_what_was_found_not_of_what_is_left_of_it():
+    left_out = {"no_room": 0.194, "edge_margin": 0.0}
+    measures = replace(MEASURES, coverage=0.806, left_out=left_out, unreached=0.0)
+    (line,) = Limits(min_coverage=0.95).broken(made_up(measures=measures))
+    assert "is 0.806, below 0.95 (left out: 0.194, unreached: 0.000)" in line
+
+
+def test_the_distance_is_that_from_the_surface_planned_on_where_no_other_is_known():
+    measures = replace(MEASURES, true_distance_worst_m=None, judged_by=None)
+    assert Limits(max_surface_distance_m=0.001).broken(made_up(measures=measures)) == []
+    (line,) = Limits(max_surface_distance_m=0.0005).broken(made_up(measures=measures))
+    assert "from the surface planned on is 0.9 mm, above 0.5 mm" in line
 
 
 def test_no_limit_is_always_met():

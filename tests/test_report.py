@@ -30,9 +30,22 @@ def test_a_report_says_what_was_found_asked_and_measured():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"coverage": 0.9}, "the tool does not reach 10.0% of the region inside its margin"),
+        (
+            {"unreached": 0.1},
+            "the tool does not reach 10.0% of the region, beside what is left out",
+        ),
+        (
+            {"left_out": {"no_room": 0.194, "edge_margin": 0.1}},
+            "19.4% of the region has less than 0 mm free before it, and is left out",
+        ),
+        ({"step_worst_m": 0.287}, "a step of 287 mm between neighbouring waypoints; 20 mm were"),
+        ({"turn_worst_rad": 1.6}, "the tool's axis turns by 91.67° between neighbouring waypoints"),
         ({"line_spacing_worst_m": 0.05}, "lines are up to 50 mm apart; 40 mm were asked for"),
-        ({"surface_distance_99_m": 0.003}, "more than 3 mm off the surface"),
+        ({"true_distance_99_m": 0.003}, "more than 3 mm off the mesh as given (12 triangles)"),
+        (
+            {"surface_distance_99_m": 0.003, "true_distance_99_m": None},
+            "more than 3 mm off the surface planned on",
+        ),
         ({"axis_error_99_rad": 0.2}, "a tool axis more than 11.46° off"),
     ],
 )
@@ -40,6 +53,11 @@ def test_what_a_person_should_look_at_is_said(change, message):
     report = report_of(made_up(measures=replace(MEASURES, **change)), Limits())
     (line,) = report["warnings"]
     assert line.startswith("region 'top', sand: ") and message in line
+
+
+def test_what_the_plan_says_of_itself_is_no_warning_where_the_object_is_known():
+    fine = replace(MEASURES, surface_distance_99_m=0.003)
+    assert report_of(made_up(measures=fine), Limits())["warnings"] == []
 
 
 def test_a_doubtful_region_is_said():
@@ -61,10 +79,12 @@ def test_what_is_skipped_has_its_reason():
 
 def test_figures_are_shown_as_people_read_them():
     assert dict(zip(FIGURES, figures(vars(MEASURES)), strict=True)) == {
-        "coverage": "99.5%",
+        "worked · left out · unreached": "99.5 · 0.0 · 0.5 %",
         "overlap": "40%",
         "line spacing, mean · worst": "40.0 · 42.0 mm",
-        "off surface, 99 % · worst": "0.4 · 0.9 mm",
+        "largest step · turn · turn by mm": "21.0 mm · 1° · 0.1°/mm",
+        "off the object, 95 % · worst": "0.6 · 1.2 mm",
+        "off the planned surface, 99 % · worst": "0.4 · 0.9 mm",
         "axis off, 99 %": "0.6°",
         "length": "4.00 m",
         "time": "50 s",

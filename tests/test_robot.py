@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -17,12 +18,13 @@ from nrdf.errors import ProcessError, RobotError
 from nrdf.process.frames import surface_frames
 from nrdf.process.toolpath import Segment, ToolPath
 from nrdf.robot.arm import BUNDLED, load_arm
-from nrdf.robot.cell import Cell, Placement
+from nrdf.robot.cell import Cell, Placement, upright_turn
 from nrdf.robot.inverse import Library, errors, solve
 from nrdf.robot.solid import _without_specks, solid_from_points
 from nrdf.robot.spheres import cover_box, cover_capsule, cover_cylinder
 from nrdf.robot.timing import STEP_S, timed
 from nrdf.robot.tool import tool_of
+from nrdf.similarity import Similarity, about_up, up_axis, upright
 
 PLACE = Placement((0.8, 0.0, 0.4), np.pi, 0.4, (0.0,))
 
@@ -52,7 +54,7 @@ def path_of(positions=((0.0, 0.2, 0.0), (0.05, 0.2, 0.0)), force=10.0):
 
 @pytest.fixture(scope="module")
 def cell(arm, bowl):
-    return Cell.build(arm, tool_of(path_of()), bowl, PLACE, np.array([0.0, 1.0, 0.0]))
+    return Cell.build(arm, tool_of(path_of()), bowl, PLACE, upright_turn(*np.eye(3)[[1, 0]]))
 
 
 def test_the_bundled_arm_has_a_ur10es_reach_and_limits(arm):
@@ -263,8 +265,105 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
     out = done.paths[0].outcome
     assert out.reached == out.waypoints == 27
     assert out.force_within is not None and out.force_within > 0.95
-    assert out.coverage_achieved == pytest.approx(out.coverage_planned, abs=0.03)
+    assert out.achieved.worked == pytest.approx(out.planned.worked, abs=0.03)
+    for found in (out.planned, out.driven, out.achieved):
+        assert found.worked + sum(found.left_out.values()) + found.unreached == pytest.approx(1.0)
+    # Three lines do not work the whole plate.
+    assert out.achieved.unreached == pytest.approx(0.6, abs=0.03)
     assert not done.paths[0].collisions
+
+
+def turned_job(job, folder, pose):
+    """The plate's job, its object and tool paths, in another frame."""
+    import nrdf
+    from nrdf.process.toolpath import read_job, write_job
+
+    def turned(segment):
+        held = Rotation.from_matrix(pose.rotation) * Rotation.from_quat(segment.quaternions_xyzw)
+        positions = pose.to_scan(segment.positions)
+        return replace(segment, positions=positions, quaternions_xyzw=held.as_quat())
+
+    (folder / "knowledge.yaml").write_text((job / "knowledge.yaml").read_text())
+    cloud = nrdf.read_cloud(job / "target.ply")
+    normals = cloud.normals @ pose.rotation.T
+    nrdf.write_cloud(
+        folder / "target.ply", replace(cloud, points=pose.to_scan(cloud.points), normals=normals)
+    )
+    whole = read_job(job)
+    paths = tuple(replace(p, segments=tuple(map(turned, p.segments))) for p in whole.paths)
+    write_job(folder, replace(whole, paths=paths, pose=pose))
+    return folder
+
+
+@pytest.mark.parametrize("up", ["z", "-x", "0.2 0.3 0.9"])
+def test_a_job_stands_upright_in_the_cell_as_its_pose_says(job, tmp_path, up):
+    from nrdf.robot.simulate import read_work
+
+    rotation = upright(up_axis(up)) @ about_up(0.4)
+    pose = Similarity(rotation, np.array([2.0, -1.0, 5.0]), 1.0)
+    work = read_work(turned_job(job, tmp_path, pose))
+    assert work.origin == "the object stands as the job's pose says" and not work.assumed
+    solid = solid_from_points(work.points, work.normals)
+    (there,) = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,)).T_cell_object(solid, work.upright)
+    np.testing.assert_allclose(there[:3, :3] @ rotation[:, 1], [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(there[:3, :3] @ rotation[:, 0], [1, 0, 0], atol=1e-9)
+    points = work.points @ there[:3, :3].T + there[:3, 3]
+    assert points[:, 2].min() == pytest.approx(0.1, abs=0.01)
+    assert np.ptp(points[:, 2]) == pytest.approx(0.03, abs=1e-6)  # the plate lies flat
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    np.testing.assert_allclose(middle[:2], 0.0, atol=0.01)
+
+
+def test_a_job_that_lies_is_driven_as_one_that_stands(job, arm, tmp_path):
+    from nrdf.robot.figures import report_of
+    from nrdf.robot.simulate import read_work, simulate
+
+    pose = Similarity(upright(up_axis("z")), np.zeros(3), 1.0)
+    place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
+    report = report_of(simulate(read_work(turned_job(job, tmp_path, pose)), arm, placement=place))
+    assert report["total"]["reached_share"] == 1.0
+    assert report["placement"]["up"] == pytest.approx([0, 0, 1])
+    assert not any("how its object lies" in line for line in report["warnings"])
+
+
+def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_to_be(job):
+    from nrdf.robot.simulate import read_work
+
+    work = read_work(job)
+    np.testing.assert_allclose(work.upright[[2, 0]], np.eye(3)[[1, 0]], atol=1e-12)
+    assert work.assumed and "taken to have +Y up and +X ahead" in work.origin
+    given = read_work(job, "z")
+    np.testing.assert_allclose(given.upright[[2, 0]], np.eye(3)[[2, 0]], atol=1e-12)
+    assert not given.assumed and given.origin == "up is z, as given"
+
+
+def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
+    from nrdf.process.knowledge_file import read_knowledge, write_knowledge
+    from nrdf.process.toolpath import read_job, write_job
+    from nrdf.robot.simulate import read_work
+
+    for name in ("target.ply", "knowledge.yaml"):
+        (tmp_path / name).write_bytes((job / name).read_bytes())
+    knowledge = read_knowledge(tmp_path / "knowledge.yaml")
+    (sand,) = knowledge.regions[0].processes
+
+    def write(*processes):
+        region = knowledge.regions[0].model_copy(update={"processes": list(processes)})
+        write_knowledge(
+            tmp_path / "knowledge.yaml", knowledge.model_copy(update={"regions": [region]})
+        )
+
+    whole = read_job(job)
+    (path,) = whole.paths
+    second = sand.model_copy(update={"name": "sand 2", "edge_margin_m": 0.05})
+    write(sand, second)
+    write_job(tmp_path, replace(whole, paths=(replace(path, process="sand 2"), path)))
+    assert [p.edge_margin_m for p in read_work(tmp_path).processes] == [0.05, 0.0]
+    # A job of before: nothing tells which of the two it was.
+    write(sand, second.model_copy(update={"name": None}))
+    write_job(tmp_path, whole)
+    with pytest.raises(ProcessError, match=r"'sand' on 'top' may be of 2 processes of that name"):
+        read_work(tmp_path)
 
 
 def test_force_is_kept_over_a_bend_that_few_waypoints_tell(arm, tmp_path):
@@ -341,4 +440,11 @@ def test_the_folder_of_a_simulation(job, arm, tmp_path):
     joints = np.array([[float(x) for x in row.split(",")[6:12]] for row in rows])
     assert np.abs(np.diff(joints, axis=0)).max() < 0.15  # no jumps
     assert "servoj(" in (tmp_path / "joints.script").read_text()
-    assert "plate" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert "plate" in page
+    said = "the job does not say how its object lies: taken to have +Y up and +X ahead"
+    assert report["placement"]["object_lies"] == said and said in page
+    assert any(said in line for line in report["warnings"])
+    coverage = report["paths"][0]["coverage"]
+    shares = coverage["achieved"], *coverage["left_out"].values(), coverage["unreached"]
+    assert sum(shares) == pytest.approx(1.0)

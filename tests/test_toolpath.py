@@ -4,9 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from nrdf.errors import OutputError, ProcessError
 from nrdf.process.toolpath import FILE, Job, Segment, ToolPath, read_job, write_job
+from nrdf.similarity import Similarity
+
+POSE = Similarity(
+    Rotation.from_euler("xyz", [0.3, -1.2, 2.0]).as_matrix(), np.array([1.0, -0.5, 0.25]), 0.9
+)
 
 
 def random_segment(rng, kind="process", count=7):
@@ -24,7 +30,7 @@ def random_job():
         ToolPath("back", "inspect", "camera", 0.01, segments[:1]),
         ToolPath("legs", "oil", "pad", 0.01, (), None, {}, (0.1, 0.0, 0.2), (0.6, 0.8, 0, 0), 2.5),
     )
-    return Job("chair", "cell", paths)
+    return Job("chair", "cell", paths, POSE)
 
 
 def changed(tmp_path, change):
@@ -42,6 +48,11 @@ def test_a_job_comes_back_exactly(tmp_path):
     for place in (tmp_path, tmp_path / FILE):
         read = read_job(place)
         assert (read.category, read.frame) == ("chair", "cell")
+        np.testing.assert_allclose(read.pose.rotation, POSE.rotation, atol=1e-14)
+        np.testing.assert_array_equal(read.pose.translation, POSE.translation)
+        assert read.pose.scale == POSE.scale
+        np.testing.assert_allclose(read.up, POSE.rotation @ [0, 1, 0], atol=1e-14)
+        np.testing.assert_allclose(read.forward, POSE.rotation @ [1, 0, 0], atol=1e-14)
         for path, again in zip(job.paths, read.paths, strict=True):
             for name in (
                 "region", "process", "tool", "tool_radius_m", "spindle_rad_s", "parameters",
@@ -57,6 +68,21 @@ def test_a_job_comes_back_exactly(tmp_path):
     assert read_job(tmp_path).paths[0].tool_radius_m == 0.0625
 
 
+def test_an_early_job_has_no_pose_and_is_taken_to_be_canonical(tmp_path):
+    def early(content):
+        content.pop("pose")
+        content["version"] = 1
+
+    job = read_job(changed(tmp_path, early))
+    assert job.pose is None
+    assert (job.up.tolist(), job.forward.tolist()) == ([0, 1, 0], [1, 0, 0])
+    assert read_job(write_job(tmp_path, job)).pose is None
+
+
+def pose_with(**changes):
+    return lambda content: content["pose"].update(changes)
+
+
 def segment_with(**changes):
     return lambda content: content["paths"][0]["segments"][1].update(changes)
 
@@ -64,7 +90,7 @@ def segment_with(**changes):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda c: c.update(version=2), "version 2; this nrdf reads versions up to 1: update nrdf"),
+        (lambda c: c.update(version=3), "version 3; this nrdf reads versions up to 2: update nrdf"),
         (lambda c: c.pop("version"), "version: is missing"),
         (lambda c: c.update(speed=1), "unknown key 'speed'"),
         (lambda c: c.update(frame="a\nb"), r"frame: a name with line breaks.*'a\\nb'"),
@@ -79,6 +105,11 @@ def segment_with(**changes):
         (segment_with(positions_m=[]), "positions_m: .*at least 1"),
         (segment_with(positions_m=[[0, 0]]), r"positions_m\[0\]\[2\]: is missing"),
         (segment_with(quaternions_xyzw=[[0, 0, 0, 2]]), "a quaternion of length 2, not 1"),
+        (pose_with(quaternion_xyzw=[0, 0, 0, 2]), "a quaternion of length 2, not 1"),
+        (pose_with(scale_m=0), "pose.scale_m: must be above 0"),
+        (pose_with(translation_m=[0, float("nan"), 0]), "pose.translation_m.*finite"),
+        (pose_with(up=[0, 0, 1]), "pose contradicts itself: up is 0 0 1, but its quaternion takes"),
+        (lambda c: c["pose"].pop("up"), "pose.up: is missing"),
         (segment_with(positions_m=[[0, 0, 0]]), "has 1 positions_m, but 7 quaternions_xyzw"),
     ],
 )

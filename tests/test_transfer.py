@@ -66,7 +66,7 @@ def process_segments(step):
 
 def test_processes_come_in_their_order(transferred):
     steps = [(step.region, step.number, step.process.label) for step in transferred.paths]
-    assert steps == [("right", 0, "oil"), ("top", 0, "sand"), ("top", 1, "sand"),
+    assert steps == [("right", 0, "oil"), ("top", 0, "sand"), ("top", 1, "sand 2"),
                      ("front", 0, "seam")]  # fmt: skip
     assert all(step.path is not None and not step.reason for step in transferred.paths)
     assert set(transferred.seconds) == {"regions", "surface", "tool paths"}

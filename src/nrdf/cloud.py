@@ -12,6 +12,7 @@ import numpy as np
 from nrdf import ply
 from nrdf.errors import CloudError
 from nrdf.formats import reader_of
+from nrdf.mesh import Mesh
 from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
@@ -27,7 +28,9 @@ class PointCloud:
     points: (n, 3) float64, finite; normals: (n, 3) float64, unit length, outward, or None;
     unit: "m", "mm", … or None where the file does not say; frame: name of the coordinate frame, or
     None; colours: (n, 3) uint8 or None; intensity: (n,) float32 or None; sensors: (s, 3) float64,
-    where the sensors stood that saw the points, in the same frame and unit, or None if unknown.
+    where the sensors stood that saw the points, in the same frame and unit, or None if unknown;
+    mesh: what the points were sampled from, in the same frame and unit, or None where there is
+    none. It stays the whole mesh when points are selected.
     """
 
     points: np.ndarray
@@ -37,6 +40,7 @@ class PointCloud:
     colours: np.ndarray | None = None
     intensity: np.ndarray | None = None
     sensors: np.ndarray | None = None
+    mesh: Mesh | None = None
 
     def __post_init__(self) -> None:
         points = np.ascontiguousarray(self.points, dtype=np.float64)
@@ -74,8 +78,9 @@ def read_cloud(
     """Point cloud of the file `path`; the format is told from its content and its name's ending.
 
     A mesh (faces in a PLY, OFF, OBJ, STL or GLB file) is sampled: `mesh_samples` points spread
-    evenly over what is visible from outside, always the same ones, with outward normals; its
-    vertices would be a poor cloud. With `mesh_samples` 0 the vertices are taken all the same.
+    evenly over what is visible from outside, always the same ones, with outward normals, and kept
+    as `PointCloud.mesh`; its vertices would be a poor cloud. With `mesh_samples` 0 the vertices are
+    taken all the same.
     Normals in the file are used as they are, brought to unit length; they are left out if some are
     missing.
     A PLY comment ``unit mm``, ``frame name`` or ``sensor x y z`` (one each) sets the unit, the
@@ -135,7 +140,8 @@ def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
     """The cloud, whose coordinates are in `unit`, in metres."""
     length = METRES[unit]
     sensors = None if cloud.sensors is None else cloud.sensors * length
-    return replace(cloud, points=cloud.points * length, sensors=sensors, unit="m")
+    mesh = None if cloud.mesh is None else cloud.mesh.scaled(length)
+    return replace(cloud, points=cloud.points * length, sensors=sensors, unit="m", mesh=mesh)
 
 
 def check_cloud(cloud: PointCloud, minimum_points: int) -> None:

@@ -24,6 +24,18 @@ _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's ow
 
 
 @dataclass(frozen=True)
+class Mesh:
+    """Triangles as a file has them: vertices (v, 3) float64, faces (f, 3) of vertex indices."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+    def scaled(self, factor: float) -> Mesh:
+        """The same, larger by `factor`."""
+        return Mesh(self.vertices * factor, self.faces)
+
+
+@dataclass(frozen=True)
 class Skin:
     """Points (n, 3) of a mesh that are seen from outside, with outward unit normals (n, 3), and the
     face (n,) that each lies on."""

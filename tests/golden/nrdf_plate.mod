@@ -1,6 +1,7 @@
 MODULE mod_nrdf_plate
   ! Tool paths for a plate, written by nrdf.
   ! Frame: cell. Positions are those of the tool centre point. Lengths in mm, speeds in mm/s.
+  ! In the frame, up for the object is 0.0000 0.0000 1.0000, ahead is 0.0000 1.0000 0.0000.
   ! Orientation: quaternion q1 q2 q3 q4 = w x y z; tool z points into the part, tool x along the
   ! travel.
   ! Contact force is not carried: it needs the option Force Control, and stands in comments.

@@ -167,7 +167,10 @@ class Figure:
 def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Figure]:
     """The figures that tool paths are held to, of those results that have them."""
     made = [
-        _figure("coverage, %", ">= 99", [100.0 * r.measures.coverage for r in results], 99.0, True),
+        _figure(
+            "coverage of what is not left out, %", ">= 99",
+            [_covered(r.measures) for r in results], 99.0, True,
+        ),
         _figure(
             "worst line spacing, stepovers", "<= 1.15",
             [
@@ -185,11 +188,25 @@ def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Fi
             "tool axis (99 %), degrees", "<= 5",
             [float(np.degrees(r.measures.axis_error_99_rad)) for r in results], 5.0,
         ),
+        _figure(
+            "largest step between waypoints, spacings", "<= 2",
+            [r.measures.step_worst_m / strategy.spacing_m for r in results], 2.0,
+        ),
+        _figure(
+            "largest turn between waypoints, degrees", "<= 30",
+            [float(np.degrees(r.measures.turn_worst_rad)) for r in results], 30.0,
+        ),
     ]  # fmt: skip
     near = [100.0 * r.near for r in results if r.near is not None]
     if near:
         made.append(_figure("within 1 mm of exact surface, %", "", near, 99.0, True))
     return [figure for figure in made if len(figure.values)]
+
+
+def _covered(measures: Measures) -> float:
+    """The share, in per cent, of what is to be worked that is worked."""
+    wanted = measures.coverage + measures.unreached
+    return 100.0 * measures.coverage / wanted if wanted > 0.0 else 0.0
 
 
 def _figure(

@@ -20,7 +20,7 @@ def simulate(
     stand: NotNegative = 0.0,
     turns: Count | None = None,
     mesh: Path | None = None,
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "y",
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None,
     shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
     pictures: bool = True,
     seed: Seed = 0,
@@ -47,7 +47,7 @@ def simulate(
             it does unless given where the base is given.
         mesh: Mesh of the object in metres, in the job's frame, for collisions; the scan unless
             given.
-        up: Direction in the job's frame that points up.
+        up: Direction in the job's frame that points up; as the job says unless given.
         shift_mm: Put the object off its place by x y z, in its own frame, to try the force control.
         pictures: Draw pictures and a film.
         seed: Of the random searches.

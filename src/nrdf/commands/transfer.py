@@ -32,6 +32,8 @@ def transfer(
     max_line_spacing_mm: NotNegative | None = None,
     max_surface_distance_mm: NotNegative | None = None,
     max_axis_error_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
+    max_step_mm: NotNegative | None = None,
+    max_turn_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
     max_cycle_time_s: NotNegative | None = None,
     require_all: bool = False,
     strict: bool = False,
@@ -62,10 +64,14 @@ def transfer(
         region: Region files of the target, marked by hand, named after taught regions: they are
             taken instead of what is found.
         min_confidence: Regions found with less mean confidence are taken to be absent (0.2).
-        min_coverage: Limit on the share of each region that its tool reaches, 0 to 1.
+        min_coverage: Limit on the share of each whole region, as it was found, that its tool works,
+            0 to 1.
         max_line_spacing_mm: Limit on the distance between neighbouring lines.
-        max_surface_distance_mm: Limit on the waypoints' distance from the surface.
+        max_surface_distance_mm: Limit on the distance of what is worked from the object as given:
+            from the mesh itself, or from the surface between all of a cloud's points.
         max_axis_error_deg: Limit on the tool axis' error, of 99 % of the waypoints.
+        max_step_mm: Limit on the step between neighbouring waypoints of a line.
+        max_turn_deg: Limit on the turn of the tool's axis between neighbouring waypoints of a line.
         max_cycle_time_s: Limit on the time of all tool paths together.
         require_all: Limit: every process of every region must have a tool path.
         strict: Limit: nothing may be doubtful about the target's pose, unit and kind, and about
@@ -84,6 +90,8 @@ def transfer(
         max_line_spacing_m=_scaled(max_line_spacing_mm, 1e-3),
         max_surface_distance_m=_scaled(max_surface_distance_mm, 1e-3),
         max_axis_error_rad=_scaled(max_axis_error_deg, math.pi / 180),
+        max_step_m=_scaled(max_step_mm, 1e-3),
+        max_turn_rad=_scaled(max_turn_deg, math.pi / 180),
         max_cycle_time_s=max_cycle_time_s,
         require_all=require_all,
     )

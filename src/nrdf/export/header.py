@@ -6,7 +6,7 @@ import math
 import textwrap
 from pathlib import Path
 
-from nrdf.export.names import plain_text
+from nrdf.export.names import numbers, plain_text
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.prepare import tool_numbers
 from nrdf.ply import write_atomically
@@ -33,6 +33,7 @@ def header(
     lines = [
         f"Tool paths for a {plain_text(job.category)}, written by nrdf.",
         f"Frame: {plain_text(job.frame)}. Positions are those of the tool centre point. {unit}",
+        _lying(job),
         f"Orientation: {orientation}",
         carried,
         *([notes] if notes else []),
@@ -43,6 +44,17 @@ def header(
         f"{path_title(path, i)}, {_describe(path)}, tool {numbers[path.tool]}."
         for i, path in enumerate(job.paths, start=1)
     ]
+
+
+def _lying(job: Job) -> str:
+    """How the object lies in the frame."""
+    if job.pose is None:
+        return (
+            "The job does not say how the object lies in the frame: taken to have +Y up and +X "
+            "ahead."
+        )
+    up, ahead = (" ".join(numbers(axis, 4)) for axis in (job.up, job.forward))
+    return f"In the frame, up for the object is {up}, ahead is {ahead}."
 
 
 def tool_z_words(options: Options, tool_z: ToolZ) -> str:

@@ -11,7 +11,7 @@ from nrdf.export.header import header, save, tool_z_words
 from nrdf.export.names import program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.process.toolpath import Job
+from nrdf.process.toolpath import Job, pose_of
 
 VERSION = 1
 _CARRIED = (
@@ -76,6 +76,7 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
         "conventions": conventions,
         "category": job.category,
         "frame": job.frame,
+        "pose": pose_of(job.pose),
         "waypoint": list(WAYPOINT),
         "paths": paths,
     }

@@ -59,7 +59,7 @@ def read_obj(path: Path, mesh_samples: int) -> RawCloud:
 
 def read_mesh(path: Path, samples: int) -> RawCloud:
     """Sample the visible surface of the mesh `path` evenly, the same points every time."""
-    from nrdf.mesh import load_mesh, outer_skin
+    from nrdf.mesh import Mesh, load_mesh, outer_skin
 
     try:
         vertices, faces = load_mesh(path)
@@ -67,7 +67,7 @@ def read_mesh(path: Path, samples: int) -> RawCloud:
     except DataError as error:
         raise CloudError(str(error)) from error
     logger.info("%s is a mesh: sampled %d points of its surface", path, len(skin.points))
-    return RawCloud(skin.points, skin.normals)
+    return RawCloud(skin.points, skin.normals, mesh=Mesh(vertices, faces))
 
 
 def read_glb(path: Path, samples: int) -> RawCloud:

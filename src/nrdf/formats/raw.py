@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from nrdf.mesh import Mesh
+
 
 @dataclass
 class RawCloud:
@@ -14,7 +16,8 @@ class RawCloud:
 
     points: (n, 3); normals: (n, 3) or None; unit, frame: None where the file does not say;
     colours: (n, 3) uint8 or None; intensity: (n,) or None; sensors: (s, 3) where the sensors stood,
-    in the points' frame and unit, none if unknown; gaps: whether a point that is not finite means
+    in the points' frame and unit, none if unknown; mesh: what the points were sampled from, None
+    where the file holds points; gaps: whether a point that is not finite means
     "nothing was measured here", as in the grids of depth cameras.
     """
 
@@ -25,6 +28,7 @@ class RawCloud:
     colours: np.ndarray | None = None
     intensity: np.ndarray | None = None
     sensors: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    mesh: Mesh | None = None
     gaps: bool = False
 
 

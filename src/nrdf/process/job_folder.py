@@ -75,6 +75,7 @@ def job_of(transferred: Transferred) -> Job:
         category=transferred.lesson.knowledge.category,
         frame=transferred.target.frame or "target",
         paths=tuple(step.path for step in transferred.paths if step.path is not None),
+        pose=transferred.pose,
     )
 
 

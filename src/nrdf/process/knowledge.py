@@ -30,6 +30,7 @@ VERSION: Final = 1
 Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
 Trajectory = Literal["raster", "cross-hatch", "spiral", "contour", "taught"]
 Transfer = Literal["replan", "carry"]
+_ROOM = 190  # characters of a name to which a number is added
 WITHOUT_CONTACT = ("paint", "inspect")
 """Kinds of process that touch nothing, so have no contact force."""
 
@@ -220,6 +221,24 @@ class Region(Quantities):
     """Points that lie on the reference, in its frame."""
     processes: list[Process] = Field(min_length=1)
     """What is done to it, one after another."""
+
+    @property
+    def steps(self) -> list[Process]:
+        """The processes, each with a label of its own: where several have the same one, all but the
+        first are named after it with a number, "sand 2"."""
+        taken = {process.label for process in self.processes}
+        seen: set[str] = set()
+        made = []
+        for process in self.processes:
+            label = process.label
+            if label in seen:
+                names = (f"{process.label[:_ROOM]} {k}" for k in range(2, len(taken) + 3))
+                label = next(name for name in names if name not in taken)
+                process = process.model_copy(update={"name": label})
+            seen.add(label)
+            taken.add(label)
+            made.append(process)
+        return made
 
     @model_validator(mode="after")
     def _given_once(self) -> Region:

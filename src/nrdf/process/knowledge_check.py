@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry import estimate_normals, thin
 from nrdf.process.coverage import Measures, measure
+from nrdf.process.given_surface import GivenSurface, given_surface
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
 from nrdf.process.plan import drive, plan
@@ -47,18 +49,32 @@ def check(lesson: Lesson, progress: Callable[[int, int], None] | None = None) ->
     cloud = lesson.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
     surface = Surface(cloud.points, normals)
+    whole = lesson.cloud
+    if whole.normals is None:
+        nearest = cKDTree(cloud.points).query(whole.points)[1]
+        whole = replace(whole, normals=normals[nearest])
+    given = given_surface(whole)
     regions = {name: np.flatnonzero(np.isin(kept, of)) for name, of in lesson.regions.items()}
-    steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.processes]
+    steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.steps]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
-        checked.append(check_process(surface, name, regions[name], process))
+        checked.append(check_process(surface, name, regions[name], process, given))
         if progress is not None:
             progress(done, len(steps))
     return checked
 
 
-def check_process(surface: Surface, name: str, region: np.ndarray, process: Process) -> Checked:
-    """One process planned and measured on a region, indices (k,) of the surface's points."""
+def check_process(
+    surface: Surface,
+    name: str,
+    region: np.ndarray,
+    process: Process,
+    given: GivenSurface | None = None,
+) -> Checked:
+    """One process planned and measured on a region, indices (k,) of the surface's points.
+
+    given: the object as the user gave it, to judge the tool path by.
+    """
     warnings = []
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
     if process.trajectory != "taught" and stepover > width:
@@ -76,7 +92,7 @@ def check_process(surface: Surface, name: str, region: np.ndarray, process: Proc
             lines = taught_lines(process, surface)
             drawn = [(line.positions, line.quaternions_xyzw) for line in lines]
             segments = drive(drawn, normals_under(surface, lines), strategy)
-        measures = measure(surface, region, strategy, segments)
+        measures = measure(surface, region, strategy, segments, given)
     except ProcessError as error:
         return Checked(name, process, str(error), tuple(warnings))
     warnings += measure_warnings(process, measures)

@@ -40,6 +40,9 @@ def _doubt(region: FoundRegion) -> str:
 class Limits:
     """None where there is no limit. SI, of each tool path; the cycle time is that of all.
 
+    The coverage is that of the whole region that was found. The distance is that from the object
+    as it was given; from the surface planned on where nothing else is known.
+
     Raises ConfigError for a limit that is not finite, below 0, or a share above 1.
     """
 
@@ -47,6 +50,8 @@ class Limits:
     max_line_spacing_m: float | None = None
     max_surface_distance_m: float | None = None
     max_axis_error_rad: float | None = None
+    max_step_m: float | None = None
+    max_turn_rad: float | None = None
     max_cycle_time_s: float | None = None
     require_all: bool = False
 
@@ -72,14 +77,23 @@ class Limits:
     def _broken_by(self, measures: Measures) -> list[str]:
         lines = []
         if self.min_coverage is not None and measures.coverage < self.min_coverage:
-            lines.append(f"the coverage is {measures.coverage:.3f}, below {self.min_coverage:g}")
+            lines.append(
+                f"the coverage of the whole region is {measures.coverage:.3f}, below "
+                f"{self.min_coverage:g} (left out: {sum(measures.left_out.values()):.3f}, "
+                f"unreached: {measures.unreached:.3f})"
+            )
+        off, from_what = measures.true_distance_worst_m, measures.judged_by
+        if off is None:
+            off, from_what = measures.surface_distance_worst_m, "the surface planned on"
         for what, name, value, limit in (
             ("worst line spacing", "spacing_m", measures.line_spacing_worst_m,
              self.max_line_spacing_m),
-            ("worst distance from the surface", "distance_m", measures.surface_distance_worst_m,
-             self.max_surface_distance_m),
+            (f"worst distance from {from_what}", "distance_m", off, self.max_surface_distance_m),
             ("tool axis' error (99th percentile)", "error_rad", measures.axis_error_99_rad,
              self.max_axis_error_rad),
+            ("largest step between waypoints", "step_m", measures.step_worst_m, self.max_step_m),
+            ("largest turn of the tool's axis between waypoints", "turn_rad",
+             measures.turn_worst_rad, self.max_turn_rad),
         ):  # fmt: skip
             if limit is not None and value is not None and value > limit:
                 said = f"{in_words(name, value)}, above {in_words(name, limit)}"

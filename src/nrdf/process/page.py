@@ -13,7 +13,7 @@ import numpy as np
 
 from nrdf.picture import region_colours
 from nrdf.ply import write_atomically
-from nrdf.process.report import FIGURES, figures
+from nrdf.process.report import FIGURES, figures, left_out_in_words
 from nrdf.units import in_words
 
 _STYLE = """
@@ -107,7 +107,7 @@ def _cards(report: Mapping[str, Any]) -> str:
         (f"{minutes} min {seconds} s", "cycle time"),
         (f"{total['process_length_m']:.1f} m", "on the surface"),
         (f"{total['path_length_m']:.1f} m", "in all"),
-        (f"{min(covered):.1%}" if covered else "–", "least coverage"),
+        (f"{min(covered):.1%}" if covered else "–", "least of a region worked"),
     )
     cards = "".join(f'<div class="card"><b>{v}</b><span>{n}</span></div>' for v, n in shown)
     return f'<div class="cards">{cards}</div>'
@@ -145,7 +145,9 @@ def _table(report: Mapping[str, Any], colours: Mapping[str, str]) -> str:
         )
         if not path["planned"]:
             why = escape(path["left_out_because"] or "")
-            rows.append(f'<tr class="none">{first}<td class="text" colspan="7">{why}</td></tr>')
+            rows.append(
+                f'<tr class="none">{first}<td class="text" colspan="{len(FIGURES)}">{why}</td></tr>'
+            )
             continue
         cells = "".join(f"<td>{cell}</td>" for cell in figures(path["measures"]))
         rows.append(f"<tr>{first}{cells}</tr>")
@@ -190,6 +192,10 @@ def _said(path: Mapping[str, Any]) -> list[tuple[str, str]]:
          f"{quantity('lead_rad')}, {quantity('tilt_rad')}, {quantity('standoff_m')}"),
         ("force, feed", f"{quantity('force_n')}, {quantity('feed_m_s')}"),
     ]  # fmt: skip
+    measures = path["measures"]
+    lines.append(("left out of the region", left_out_in_words(measures["left_out"])))
+    if measures["judged_by"] is not None:
+        lines.append(("judged by", measures["judged_by"]))
     if asked.get("spindle_rad_s") is not None:
         lines.append(("spindle", quantity("spindle_rad_s")))
     if direction is not None:

@@ -7,18 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.process.coverage import Measures
+from nrdf.process.coverage import NO_ROOM, REASONS, Measures
 from nrdf.process.knowledge import Process
 from nrdf.process.limits import Limits, doubts_of
+from nrdf.process.toolpath import pose_of
 from nrdf.process.transfer import Transferred, TransferredPath
 from nrdf.units import in_words
 
 FIGURES = (
-    "coverage", "overlap", "line spacing, mean · worst", "off surface, 99 % · worst",
-    "axis off, 99 %", "length", "time",
+    "worked · left out · unreached", "overlap", "line spacing, mean · worst",
+    "largest step · turn · turn by mm", "off the object, 95 % · worst",
+    "off the planned surface, 99 % · worst", "axis off, 99 %", "length", "time",
 )  # fmt: skip
-SHORT_FIGURES = ("coverage", "widest lines", "off surface", "axis off", "time")
-_LEAST_COVERAGE = 0.97
+SHORT_FIGURES = (
+    "worked · left out · unreached", "widest lines", "step · turn", "off object", "axis off",
+    "time",
+)  # fmt: skip
+_MOST_UNREACHED = 0.03
+_LARGEST_STEP = 2.0  # times the spacing of waypoints
+_LARGEST_TURN_RAD = np.radians(30.0)
 _WIDEST_LINES = 1.15  # times the stepover
 _FARTHEST_M = 0.001
 _STEEPEST_RAD = np.radians(5.0)
@@ -42,6 +49,7 @@ def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
         "category": transferred.lesson.knowledge.category,
         "unit": "m",
         "frame": transferred.target.frame,
+        "pose": pose_of(transferred.pose),
         "regions": _regions(transferred),
         "paths": paths,
         "total": {
@@ -82,6 +90,7 @@ def _path(step: TransferredPath, skipped: bool) -> dict[str, Any]:
     process = step.process
     content: dict[str, Any] = {
         "region": step.region,
+        "number": step.number,
         "process": process.label,
         "kind": process.kind,
         "transfer": step.way,
@@ -111,15 +120,16 @@ def _asked(process: Process) -> dict[str, Any]:
 def measure_warnings(process: Process, measures: Measures) -> list[str]:
     """What a person should look at before a path is driven."""
     lines = []
-    if measures.left_out > 0.0:
+    if measures.left_out[NO_ROOM] > 0.0:
         room = in_words("clearance_m", process.tool.clearance_m)
         lines.append(
-            f"{measures.left_out:.1%} of the region has less than {room} free before it, and is "
-            "left out"
+            f"{measures.left_out[NO_ROOM]:.1%} of the region has less than {room} free before it, "
+            "and is left out"
         )
-    if measures.coverage < _LEAST_COVERAGE:
+    if measures.unreached > _MOST_UNREACHED:
         lines.append(
-            f"the tool does not reach {1 - measures.coverage:.1%} of the region inside its margin"
+            f"the tool does not reach {measures.unreached:.1%} of the region, beside what is left "
+            "out"
         )
     worst, stepover = measures.line_spacing_worst_m, process.distance_between_lines_m
     if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
@@ -127,30 +137,64 @@ def measure_warnings(process: Process, measures: Measures) -> list[str]:
             f"lines are up to {in_words('spacing_m', worst)} apart; "
             f"{in_words('stepover_m', stepover)} were asked for"
         )
-    if measures.surface_distance_99_m > _FARTHEST_M and process.trajectory != "taught":
-        away = in_words("distance_m", measures.surface_distance_99_m)
-        lines.append(f"1 % of the waypoints are more than {away} off the surface")
+    if process.trajectory != "taught" and measures.step_worst_m > _LARGEST_STEP * process.spacing_m:
+        step, asked = (in_words("_m", x) for x in (measures.step_worst_m, process.spacing_m))
+        lines.append(f"a step of {step} between neighbouring waypoints; {asked} were asked for")
+    if measures.turn_worst_rad > _LARGEST_TURN_RAD:
+        turn = in_words("_rad", measures.turn_worst_rad)
+        lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
+    lines += _distance_warnings(process, measures)
     if measures.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
         error = in_words("error_rad", measures.axis_error_99_rad)
         lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
     return lines
 
 
+def _distance_warnings(process: Process, measures: Measures) -> list[str]:
+    """By the object as it was given, where that is known: the plan cannot judge itself."""
+    planned, true = measures.surface_distance_99_m, measures.true_distance_99_m
+    if true is not None and true > _FARTHEST_M:
+        away = in_words("_m", true)
+        return [f"1 % of the way on the surface is more than {away} off {measures.judged_by}"]
+    if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
+        away = in_words("_m", planned)
+        return [f"1 % of the waypoints are more than {away} off the surface planned on"]
+    return []
+
+
+def left_out_in_words(left_out: Mapping[str, float]) -> str:
+    """What is left out of a region, share by share, or a dash."""
+    shares = [f"{REASONS.get(why, why)} {share:.1%}" for why, share in left_out.items() if share]
+    return ", ".join(shares) or "–"
+
+
+def shares_in_words(measures: Mapping[str, Any]) -> str:
+    """What is worked, left out and not reached of a whole region, in per cent."""
+    left_out = sum(measures["left_out"].values())
+    shares = (measures["coverage"], left_out, measures["unreached"])
+    return " · ".join(f"{100.0 * share:.1f}" for share in shares) + " %"
+
+
 def figures(measures: Mapping[str, Any]) -> list[str]:
     """A tool path's measures as people read them, one for each of `FIGURES`."""
-    coverage, _, _, axis, time = short_figures(measures)
+    shares, _, jump, _, axis, time = short_figures(measures)
     length = f"{measures['process_length_m']:.2f} m"
     spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
+    true = _millimetres(measures["true_distance_95_m"], measures["true_distance_worst_m"])
     away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
-    return [coverage, f"{measures['overlap']:.0%}", spacing, away, axis, length, time]
+    jump += f" · {np.degrees(measures['bend_worst_rad_m']) / 1e3:.1f}°/mm"
+    overlap = f"{measures['overlap']:.0%}"
+    return [shares, overlap, spacing, jump, true, away, axis, length, time]
 
 
 def short_figures(measures: Mapping[str, Any]) -> list[str]:
-    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`: off object is
+    the 95th percentile."""
     return [
-        f"{measures['coverage']:.1%}",
+        shares_in_words(measures),
         _millimetres(measures["line_spacing_worst_m"]),
-        _millimetres(measures["surface_distance_99_m"]),
+        f"{_millimetres(measures['step_worst_m'])} · {np.degrees(measures['turn_worst_rad']):.0f}°",
+        _millimetres(measures["true_distance_95_m"]),
         f"{np.degrees(measures['axis_error_99_rad']):.1f}°",
         f"{measures['cycle_time_s']:.0f} s",
     ]

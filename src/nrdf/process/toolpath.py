@@ -14,16 +14,20 @@ from pydantic import (
     Field,
     ValidationError,
 )
+from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.ply import write_atomically
+from nrdf.similarity import Similarity
 from nrdf.strict import Location, Strict, explain
 
-VERSION = 1
+VERSION = 2
+"""Since 2 a job says how its object lies in its frame (`Job.pose`)."""
 FILE = "toolpaths.json"
 SegmentKind = Literal["approach", "process", "departure"]
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
+_SAME_UP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,8 @@ class Segment:
 class ToolPath:
     """All of one process step on one region.
 
-    region: its name. process: its kind ("sand", "paint", ...). tool: the tool's name.
+    region: its name. process: the label of the process that made it ("sand", "paint 2", ...), which
+    no other process on that region has. tool: the tool's name.
     tool_radius_m: radius of its footprint. spindle_rad_s: None where nothing turns.
     segments: in the order in which they are driven. parameters: free custom parameters.
     tcp_m, tcp_quaternion_xyzw: the tool frame in the robot's flange frame, None where not known.
@@ -78,12 +83,25 @@ class Job:
     """Tool paths for one object, in the order in which they are driven.
 
     category: what the object is. frame: name of the frame that positions are in (the target
-    cloud's own). paths: in order.
+    cloud's own). paths: in order. pose: of the object in that frame, from canonical coordinates (+X
+    forward, +Y up, longest side 1), m; None in a job that does not say: an early file.
     """
 
     category: str
     frame: str
     paths: tuple[ToolPath, ...]
+    pose: Similarity | None = None
+
+    @property
+    def up(self) -> np.ndarray:
+        """The direction (3,) in the frame that is up for the object; +Y where the job does not say
+        how it lies."""
+        return np.eye(3)[1] if self.pose is None else self.pose.rotation[:, 1]
+
+    @property
+    def forward(self) -> np.ndarray:
+        """The direction (3,) in the frame that the object faces; +X where the job does not say."""
+        return np.eye(3)[0] if self.pose is None else self.pose.rotation[:, 0]
 
 
 def read_job(folder: str | Path) -> Job:
@@ -110,7 +128,8 @@ def read_job(folder: str | Path) -> Job:
 
 
 def write_job(folder: str | Path, job: Job) -> Path:
-    """Write `job` into an existing folder; the file's path. `read_job` gives exactly the same back.
+    """Write `job` into an existing folder; the file's path. `read_job` gives exactly the same back,
+    but for the last digits of the pose's rotation.
 
     Raises ProcessError, naming the field, for what `read_job` would refuse, and OutputError where
     the folder cannot be written.
@@ -127,6 +146,19 @@ def write_job(folder: str | Path, job: Job) -> Path:
     return path
 
 
+def pose_of(pose: Similarity | None) -> dict[str, Any] | None:
+    """An object's pose as files have it: canonical coordinates times ``scale_m``, turned by the
+    quaternion and moved, are those in the object's frame."""
+    if pose is None:
+        return None
+    return {
+        "quaternion_xyzw": Rotation.from_matrix(pose.rotation).as_quat().tolist(),
+        "translation_m": np.asarray(pose.translation).tolist(),
+        "scale_m": float(pose.scale),
+        "up": pose.rotation[:, 1].tolist(),
+    }
+
+
 _KEYS = {"positions": "positions_m"}
 """Fields whose name in the file says the unit that the docstring says here."""
 
@@ -136,6 +168,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (Job, ToolPath, Segment)):
         names = [item.name for item in fields(value)]
         return {_KEYS.get(name, name): _plain(getattr(value, name)) for name in names}
+    if isinstance(value, Similarity):
+        return pose_of(value)
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if isinstance(value, dict):
@@ -210,10 +244,28 @@ class _PathContent(Strict):
         return ToolPath(segments=made, **content)
 
 
+class _PoseContent(Strict):
+    quaternion_xyzw: _Quaternion
+    translation_m: _Position
+    scale_m: _AboveZero
+    up: _Position
+
+    def made(self, where: str) -> Similarity:
+        rotation = Rotation.from_quat(self.quaternion_xyzw).as_matrix()
+        if np.abs(rotation[:, 1] - self.up).max() > _SAME_UP:
+            turned = " ".join(f"{x:.4g}" for x in rotation[:, 1])
+            raise ProcessError(
+                f"{where} contradicts itself: up is {' '.join(f'{x:.4g}' for x in self.up)}, but "
+                f"its quaternion takes +Y to {turned}"
+            )
+        return Similarity(rotation, np.array(self.translation_m), self.scale_m)
+
+
 class _JobContent(_Version, Strict):
     category: _Name
     frame: _Name
     paths: list[_PathContent]
+    pose: _PoseContent | None = None
 
 
 def _place(location: Location) -> str:
@@ -235,4 +287,5 @@ def _parse(text: bytes, origin: str) -> Job:
         lines = explain(error, _JobContent, _place)[:_MOST_COMPLAINTS]
         raise ProcessError(f"{origin}: " + "; ".join(lines)) from None
     paths = (path.made(f"{origin}: paths[{i}]") for i, path in enumerate(content.paths))
-    return Job(content.category, content.frame, tuple(paths))
+    pose = None if content.pose is None else content.pose.made(f"{origin}: pose")
+    return Job(content.category, content.frame, tuple(paths), pose)

@@ -28,6 +28,7 @@ from nrdf.output import output_folder
 from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
+from nrdf.process.given_surface import GivenSurface, given_surface
 from nrdf.process.knowledge import Line, Process, Transfer
 from nrdf.process.lesson import Lesson, overlaps, unit_and_doubts
 from nrdf.process.plan import drive, plan
@@ -39,11 +40,13 @@ from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
 from nrdf.similarity import Similarity
+from nrdf.units import in_words
 
 log = logging.getLogger(__name__)
 
 MIN_CONFIDENCE = 0.2
 """A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
+_LONGER = 2.0  # times the longest step on the reference, from which a carried one is said
 _THREADS = 4  # that plan: numpy leaves them little to do at once
 
 
@@ -80,7 +83,7 @@ class Transferred:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
     target: with normals, estimated where its file had none. seconds: time by phase. pose: from
-    canonical coordinates to the target's, for pictures that stand upright. doubts: what is doubtful
+    canonical coordinates to the target's: how the object lies there. doubts: what is doubtful
     about the object as a whole: its pose, its unit, whether it is of that kind at all; those about
     regions are added by `nrdf.process.limits.doubts_of`.
     """
@@ -169,9 +172,11 @@ class Teacher:
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
         way.target.edges  # noqa: B018, what all paths share
+        cloud = with_normals(embedded)
+        given = given_surface(cloud)
         steps, paths = self.steps(), []
         with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
-            planned = [pool.submit(self._path, *step, found[step[0]], way) for step in steps]
+            planned = [pool.submit(self._path, *step, found[step[0]], way, given) for step in steps]
             try:
                 for done, path in enumerate(planned):
                     if progress is not None:
@@ -186,8 +191,7 @@ class Teacher:
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        cloud, pose = with_normals(embedded), embedded.pose
-        made = tuple(paths)
+        made, pose = tuple(paths), embedded.pose
         return Transferred(
             self.lesson, cloud, found, made, warnings, seconds, pose, tuple(doubts or ())
         )
@@ -215,7 +219,7 @@ class Teacher:
         steps = [
             (region.name, number, process)
             for region in self.lesson.knowledge.regions
-            for number, process in enumerate(region.processes)
+            for number, process in enumerate(region.steps)
         ]
         return sorted(steps, key=lambda step: step[2].order)
 
@@ -247,7 +251,13 @@ class Teacher:
         return named[region].processes[number]
 
     def _path(
-        self, region: str, number: int, process: Process, found: FoundRegion, way: Correspondence
+        self,
+        region: str,
+        number: int,
+        process: Process,
+        found: FoundRegion,
+        way: Correspondence,
+        given: GivenSurface,
     ) -> TransferredPath:
         made = TransferredPath(region, number, process, process.way)
         if found.missing:
@@ -263,7 +273,7 @@ class Teacher:
                 segments = plan(way.target, inside, strategy)
             else:
                 process, segments, warnings = self._carry(region, number, process, way)
-            figures = measure(way.target, inside, strategy, segments)
+            figures = measure(way.target, inside, strategy, segments, given)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)
@@ -277,19 +287,30 @@ class Teacher:
         total = sum(len(line.positions) for line in lines)
         if not carried:
             raise ProcessError(f"none of the {total} waypoints has a place on the target")
-        warnings = (f"{lost} of {total} waypoints have no place on the target",) if lost else ()
+        warnings = [f"{lost} of {total} waypoints have no place on the target"] if lost else []
+        here, there = (max(longest_step(line.positions) for line in of) for of in (lines, carried))
+        if there > _LONGER * here:
+            warnings.append(
+                f"a step of {in_words('_m', there)} between neighbouring waypoints; the longest "
+                f"on the reference is {in_words('_m', here)}"
+            )
         drawn = [(line.positions, line.quaternions_xyzw) for line in carried]
         normals = [line.normals for line in carried]
         segments = drive(drawn, normals, strategy_of(process))
         waypoints = [Line(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn]
         changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
-        return process.model_copy(update=changes), segments, warnings
+        return process.model_copy(update=changes), segments, tuple(warnings)
 
 
 def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
     """The places (n, 3) that tools at positions (n, 3), some height over a surface, point at."""
     along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
     return np.asarray(positions + standoff_m * along)
+
+
+def longest_step(positions: np.ndarray) -> float:
+    """The longest way between neighbours of positions (n, 3)."""
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max(initial=0.0))
 
 
 def with_normals(embedded: Embedded) -> PointCloud:

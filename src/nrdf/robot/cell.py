@@ -14,6 +14,7 @@ from nrdf.robot.tool import Tool
 
 COLUMN_M = 0.09
 """Radius of the column that a raised base stands on."""
+_ALONG = 0.9  # cosine to up from which a direction is none to face
 _NEIGHBOURS = 2  # links that far apart along the arm cannot be checked against each other
 _ALWAYS = 0.3  # share of random places in which two links must touch to be taken for neighbours
 
@@ -23,7 +24,7 @@ class Placement:
     """Where the arm's base and the object stand.
 
     The cell's frame has z up and its origin on the floor under the middle of the object, on the
-    turntable's axis; x is the object's own x (in the category's frame: forward) at turn 0.
+    turntable's axis; x is where the object faces at turn 0 (the category's own x).
 
     base_m: (3,) of the arm's base; base_yaw_rad: about z, from the cell's x to the base's x;
     stand_m: height of the object's lowest point above the floor; turns_rad: (k,) of the turntable.
@@ -37,20 +38,19 @@ class Placement:
     def T_cell_base(self) -> np.ndarray:
         return _pose(self.base_yaw_rad, self.base_m)
 
-    def T_cell_object(self, solid: Solid, up: np.ndarray) -> np.ndarray:
-        """Poses (k, 4, 4) of the object's frame at each turn."""
-        upright = _upright(up)
-        corners = np.array(np.meshgrid(*np.stack(solid.box).T, indexing="ij")).reshape(3, -1)
-        turned = upright @ corners
-        low, high = turned.min(axis=1), turned.max(axis=1)
+    def T_cell_object(self, solid: Solid, upright: np.ndarray) -> np.ndarray:
+        """Poses (k, 4, 4) of the object's frame at each turn; upright: (3, 3), as `upright_turn`
+        has it."""
+        turned = solid.samples @ upright.T
+        low, high = turned.min(axis=0), turned.max(axis=0)
         standing = np.eye(4)
         standing[:3, :3] = upright
         standing[:3, 3] = -0.5 * (low + high)
-        standing[2, 3] = self.stand_m - float((solid.samples @ upright.T)[:, 2].min())
+        standing[2, 3] = self.stand_m - float(low[2])
         return np.array([_pose(turn, (0.0, 0.0, 0.0)) @ standing for turn in self.turns_rad])
 
-    def T_base_object(self, solid: Solid, up: np.ndarray) -> np.ndarray:
-        return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(solid, up)
+    def T_base_object(self, solid: Solid, upright: np.ndarray) -> np.ndarray:
+        return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(solid, upright)
 
 
 def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
@@ -61,10 +61,13 @@ def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
     return pose
 
 
-def _upright(up: np.ndarray) -> np.ndarray:
-    """The rotation (3, 3) that takes `up` to z, and x, or what is left of it, to x."""
+def upright_turn(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) from an object's frame to the cell's that takes `up` (3,) to z, and
+    `forward` (3,), or what is left of it, to x."""
     up = np.asarray(up, float) / np.linalg.norm(up)
-    ahead = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
+    ahead = np.asarray(forward, float) / np.linalg.norm(forward)
+    if abs(ahead @ up) > _ALONG:
+        ahead = np.eye(3)[int(np.argmin(np.abs(up)))]
     ahead = ahead - (ahead @ up) * up
     ahead /= np.linalg.norm(ahead)
     return np.stack([ahead, np.cross(up, ahead), up])
@@ -92,7 +95,9 @@ class Cell:
     turns_rad: tuple[float, ...]
 
     @staticmethod
-    def build(arm: Arm, tool: Tool, solid: Solid, placement: Placement, up: np.ndarray) -> Cell:
+    def build(
+        arm: Arm, tool: Tool, solid: Solid, placement: Placement, upright: np.ndarray
+    ) -> Cell:
         size, flange = arm.chain.size, arm.chain.T_last_tool
         column = _column(-placement.base_m[2])
         few = arm.few_spheres + column + tool.spheres(size, flange, 4.0)
@@ -103,16 +108,16 @@ class Cell:
             spheres=arm.spheres + column + tool.spheres(size, flange),
             few=few,
             solid=solid,
-            poses=placement.T_base_object(solid, up),
+            poses=placement.T_base_object(solid, upright),
             turntable_m=np.linalg.inv(placement.T_cell_base())[:3, 3],
             floor_m=-placement.base_m[2],
             pairs=_pairs(arm.chain, few),
             turns_rad=placement.turns_rad,
         )
 
-    def placed(self, placement: Placement, up: np.ndarray) -> Cell:
+    def placed(self, placement: Placement, upright: np.ndarray) -> Cell:
         """The same arm, tool and object at another place."""
-        return Cell.build(self.arm, self.tool, self.solid, placement, up)
+        return Cell.build(self.arm, self.tool, self.solid, placement, upright)
 
     def shifted(self, shift_m: np.ndarray) -> Cell:
         """The same with the object off its place by (3,), in its own frame."""

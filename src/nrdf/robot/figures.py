@@ -12,7 +12,10 @@ from nrdf.robot.simulate import DrivenPath, Simulated
 from nrdf.robot.timing import STEP_S
 from nrdf.robot.tool import PAD_GIVES_M
 
-COLUMNS = ("reached", "coverage · planned", "force", "within ±20 %", "off plan, 99 %", "time")
+COLUMNS = (
+    "reached", "region worked · planned", "left out · unreached", "force", "within ±20 %",
+    "off plan, 99 %", "time",
+)  # fmt: skip
 _MOST_LISTED = 2000
 _MOST_WARNED = 5
 
@@ -41,13 +44,14 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
     pressed = [p for p in paths if p["force"] is not None]
     contact = sum(p["force"]["seconds"] for p in pressed)
     within = sum(p["force"]["within"] * p["force"]["seconds"] for p in pressed)
-    place = simulated.placement
+    place, work = simulated.placement, simulated.work
+    assumed = [f"{work.origin}; --up says otherwise"] if work.assumed else []
     used = sorted({a.turn for d in simulated.paths for a in d.program.actions})
     simulated_s = sum(p["time_s"] for p in paths)
     cpu = simulated.seconds.get("simulation", 0.0)
     kinematics = simulated.seconds.get("inverse kinematics", 0.0)
     return {
-        "category": simulated.work.job.category,
+        "category": work.job.category,
         "unit": "m",
         "robot": {
             "name": simulated.arm.name,
@@ -60,6 +64,9 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
             "base_m": list(place.base_m),
             "base_yaw_rad": place.base_yaw_rad,
             "stand_m": place.stand_m,
+            "object_lies": work.origin,
+            "up": work.upright[2].tolist(),
+            "forward": work.upright[0].tolist(),
             "turns_used_rad": [place.turns_rad[k] for k in used],
             "reachable_of_sample": round(simulated.reachable, 4),
         },
@@ -80,7 +87,7 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
             "times_real_time": simulated_s / cpu if cpu else None,
             "step_s": STEP_S,
         },
-        "warnings": [*simulated.arm.warnings, *_warnings(paths)],
+        "warnings": [*simulated.arm.warnings, *assumed, *_warnings(paths)],
         "notes": list(NOTES),
     }
 
@@ -118,9 +125,11 @@ def _path(driven: DrivenPath) -> dict[str, Any]:
         "leaning": out.leaning,
         "most_lean_rad": out.most_lean_rad,
         "coverage": {
-            "planned": out.coverage_planned,
-            "driven": out.coverage_driven,
-            "achieved": out.coverage_achieved,
+            "planned": out.planned.worked,
+            "driven": out.driven.worked,
+            "achieved": out.achieved.worked,
+            "left_out": out.achieved.left_out,
+            "unreached": out.achieved.unreached,
         },
         "force": force,
         "off_plan_99_m": out.off_plan_99_m,
@@ -184,6 +193,7 @@ def figures(path: Mapping[str, Any]) -> list[str]:
     return [
         f"{path['reached'] / path['waypoints']:.1%}",
         f"{coverage['achieved']:.1%} · {coverage['planned']:.1%}",
+        f"{sum(coverage['left_out'].values()):.1%} · {coverage['unreached']:.1%}",
         "–" if force is None else f"{force['mean_n']:.1f} ± {force['spread_n']:.1f} N",
         "–" if force is None else f"{force['within']:.1%}",
         f"{1e3 * path['off_plan_99_m']:.1f} mm",

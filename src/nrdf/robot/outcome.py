@@ -8,10 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from nrdf.process.coverage import Coverage, Wanted
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
-from nrdf.process.patch import inside_margin, patches_of
-from nrdf.process.room import with_room
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import ToolPath
 from nrdf.process.track import covered as reached_by
@@ -39,12 +38,12 @@ class Outcome:
 
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
     reached waypoints, of the planned joints, against the axis that they are driven with; leaning:
-    waypoints where that is not the planned one, by most_lean_rad at most. coverage_*: share of the
-    region's points inside its margin, and with room before them, that the tool reaches by the plan,
-    by what is left of it when it is driven, and in the simulation. worked, planned: (k,) of those
-    points; region_points: their indices on the target. force_*: while the tool moves along its
-    lines; None where nothing is pressed. off_plan_99_m: of the tool from its line, the way along
-    the axis left out.
+    waypoints where that is not the planned one, by most_lean_rad at most. planned, driven,
+    achieved: what becomes of the whole region by the plan, by what is left of it when it is driven,
+    and in the simulation. region_points: (k,) indices of its points on the target (of a large one,
+    those that are kept); worked, wanted: (k,) those worked in the simulation, and those that are
+    not left out. force_*: while the tool moves along its lines; None where nothing is pressed.
+    off_plan_99_m: of the tool from its line, the way along the axis left out.
     """
 
     verdicts: tuple[np.ndarray, ...]
@@ -55,12 +54,12 @@ class Outcome:
     axis_error_rad: float
     leaning: int
     most_lean_rad: float
-    coverage_planned: float
-    coverage_driven: float
-    coverage_achieved: float
+    planned: Coverage
+    driven: Coverage
+    achieved: Coverage
     region_points: np.ndarray
     worked: np.ndarray
-    planned: np.ndarray
+    wanted: np.ndarray
     force_asked_n: float | None
     force_mean_n: float | None
     force_spread_n: float | None
@@ -95,9 +94,10 @@ def outcome(
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
     leans = _leans(lines, program)
-    region = with_room(surface, lesson.regions[path.region], process.tool.clearance_m)
-    inside = inside_margin(surface, region, patches_of(surface, region), process.edge_margin_m)
-    points, normals = surface.points[inside], surface.normals[inside]
+    wanted = Wanted.of(
+        surface, lesson.regions[path.region], process.tool.clearance_m, process.edge_margin_m
+    )
+    points, normals = surface.points[wanted.points], surface.normals[wanted.points]
     height = process.standoff_m
 
     def reached(places: np.ndarray, axes: np.ndarray) -> np.ndarray:
@@ -128,12 +128,12 @@ def outcome(
         axis_error_rad=angle,
         leaning=int((leans > _LEANS_RAD).sum()),
         most_lean_rad=float(leans.max(initial=0.0)),
-        coverage_planned=float(planned.mean()) if len(planned) else 0.0,
-        coverage_driven=float(driven.mean()) if len(driven) else 0.0,
-        coverage_achieved=float(worked.mean()) if len(worked) else 0.0,
-        region_points=inside,
-        worked=worked,
-        planned=planned,
+        planned=wanted.coverage(planned),
+        driven=wanted.coverage(driven),
+        achieved=wanted.coverage(worked),
+        region_points=surface.kept[wanted.points],
+        worked=worked & wanted.free,
+        wanted=wanted.free & wanted.inside,
         force_asked_n=asked,
         force_mean_n=float(force.mean()) if len(force) else None,
         force_spread_n=float(force.std()) if len(force) else None,

@@ -26,8 +26,8 @@ def write_page(folder: Path, report: Mapping[str, Any]) -> None:
         _image(folder / STILL, "the arm at work"),
         f"<h2>Each tool path</h2>{_table(report)}",
         _image(folder / FILM, "the whole job, faster"),
-        "<h2>Where the tool really worked</h2><p class='soft'>green: worked; red: inside a "
-        "region's margin, but not worked</p>" + _image(folder / COVERAGE, "coverage")
+        "<h2>Where the tool really worked</h2><p class='soft'>green: worked; red: not "
+        "worked; amber: left out of the plan</p>" + _image(folder / COVERAGE, "coverage")
         if (folder / COVERAGE).is_file()
         else "",
         _missed(report),
@@ -47,6 +47,7 @@ def _head(report: Mapping[str, Any]) -> str:
         f"robot {report['robot']['name']}",
         f"base at {base} m from under the object, z up",
         f"object {place['stand_m']:.2f} m above the floor, {turns} turns of the turntable",
+        place["object_lies"],
     ]
     return f"<h1>{escape(report['title'])}</h1><p class='soft'>{escape(' · '.join(words))}</p>"
 

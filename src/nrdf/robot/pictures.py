@@ -23,6 +23,7 @@ FILM, STILL, COVERAGE = "film.webp", "picture.png", "coverage.png"
 _SIZE, _FILM_SIZE = (1080, 810), (520, 400)
 _FRAMES, _FRAME_MS = 90, 120
 _PLAIN, _DONE, _MISSED = (0.80, 0.81, 0.83), (0.10, 0.62, 0.35), (0.84, 0.25, 0.15)
+_LEFT_OUT = (0.93, 0.70, 0.20)
 
 
 def draw(
@@ -233,10 +234,13 @@ def _parts(
             label[lesson.regions[name]] = number
             palette.append(tuple(0.55 * inks[name] + 0.45))
     else:
-        palette += [_DONE, _MISSED]
+        palette += [_DONE, _MISSED, _LEFT_OUT]
         for driven in simulated.paths:
             out = driven.outcome
-            label[out.region_points] = np.where(out.worked, 1, 2)
+            found = np.where(out.worked, 1, np.where(out.wanted, 2, 3))
+            region = lesson.regions[driven.path.region]
+            nearest = cKDTree(points[out.region_points]).query(points[region])[1]
+            label[region] = found[nearest]
     normals = lesson.cloud.normals
     corners = solid.vertices[solid.faces]
     middle = corners.mean(axis=1)

@@ -29,22 +29,25 @@ def find_placement(
     arm: Arm,
     paths: Sequence[tuple[ToolPath, Sequence[Line]]],
     solid: Solid,
-    up: np.ndarray,
+    upright: np.ndarray,
     given: Placement | None,
     turns: int,
     rng: np.random.Generator,
 ) -> tuple[Placement, float]:
     """The best of a grid of placements, and the share of a sample of waypoints that it reaches at
-    some turn; that share alone where a placement is given."""
+    some turn; that share alone where a placement is given.
+
+    upright: (3, 3), as `nrdf.robot.cell.upright_turn` has it.
+    """
     sample = _sample(paths, rng)
     found: list[tuple[float, Placement]] = []
-    candidates = [given] if given is not None else _candidates(arm, solid, up, turns)
+    candidates = [given] if given is not None else _candidates(arm, solid, upright, turns)
     cells: dict[int, tuple[Cell, Library]] = {}
     for placement in candidates:
         reached = 0.0
         for number, (path, positions, axes) in enumerate(sample):
             if number not in cells:
-                cell = Cell.build(arm, tool_of(path), solid, placement, up)
+                cell = Cell.build(arm, tool_of(path), solid, placement, upright)
                 library = next(
                     (
                         library
@@ -55,7 +58,7 @@ def find_placement(
                 )
                 cells[number] = (cell, library or Library.build(cell, _LIBRARY, rng))
             cell, library = cells[number]
-            cell = cell.placed(placement, up)
+            cell = cell.placed(placement, upright)
             reached += places(cell, library, positions, axes, _GUESSES)[1].regular.sum()
         found.append((reached / sum(len(p) for _, p, _ in sample), placement))
     share, best = max(found, key=lambda pair: pair[0])
@@ -82,14 +85,13 @@ def _sample(
     return chosen
 
 
-def _candidates(arm: Arm, solid: Solid, up: np.ndarray, turns: int) -> list[Placement]:
+def _candidates(arm: Arm, solid: Solid, upright: np.ndarray, turns: int) -> list[Placement]:
     """Bases around a turntable: distance, height, and whether the object is raised."""
     chain = arm.chain
     reach = float(np.linalg.norm(chain.origins[1:, :3, 3], axis=1).sum())
-    low, high = solid.box
-    size = high - low
-    height = float(abs(size @ up))
-    radius = 0.5 * float(np.sqrt(max(size @ size - height**2, 0.0)))
+    size = np.ptp(solid.samples @ upright.T, axis=0)
+    height = float(size[2])
+    radius = 0.5 * float(np.hypot(size[0], size[1]))
     angles = tuple((2.0 * np.pi * np.arange(turns) / turns).tolist())
     made = []
     for stand in _STANDS:

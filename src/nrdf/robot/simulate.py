@@ -17,7 +17,7 @@ from nrdf.process.lesson import Lesson, read_lesson
 from nrdf.process.surface import Surface
 from nrdf.process.toolpath import Job, ToolPath, read_job
 from nrdf.robot.arm import Arm
-from nrdf.robot.cell import Cell, Placement
+from nrdf.robot.cell import Cell, Placement, upright_turn
 from nrdf.robot.collision import Collision
 from nrdf.robot.drive import drive
 from nrdf.robot.execute import Log
@@ -29,6 +29,7 @@ from nrdf.robot.placement import find_placement
 from nrdf.robot.program import PathProgram, find_home
 from nrdf.robot.solid import Solid, solid_from_points
 from nrdf.robot.tool import tool_of
+from nrdf.similarity import up_axis
 
 log = logging.getLogger(__name__)
 
@@ -41,13 +42,16 @@ class Work:
     """A job with the object that it is for.
 
     lesson: the job's own knowledge: the target in metres with its regions. processes: of each of
-    the job's paths. up: (3,) unit, in the target's frame.
+    the job's paths. upright: (3, 3), from the target's frame to one with z up and x where the
+    object faces; origin: where that is from, in words; assumed: whether nothing says it.
     """
 
     job: Job
     lesson: Lesson
     processes: tuple[Process, ...]
-    up: np.ndarray
+    upright: np.ndarray
+    origin: str
+    assumed: bool = False
 
     @property
     def points(self) -> np.ndarray:
@@ -89,8 +93,10 @@ class Simulated:
     seconds: dict[str, float]
 
 
-def read_work(folder: str | Path, up: str | np.ndarray = "y") -> Work:
+def read_work(folder: str | Path, up: str | None = None) -> Work:
     """A job's folder, as `nrdf transfer` writes it.
+
+    up: an axis of the job's frame ("x" to "-z"), or "x y z", instead of what the job says.
 
     Raises ProcessError where it is no such folder, or where its tool paths and its object do not
     fit each other: another frame or unit.
@@ -116,30 +122,34 @@ def read_work(folder: str | Path, up: str | np.ndarray = "y") -> Work:
     if lesson.cloud.normals is None:
         raise ProcessError(f"the job's {lesson.knowledge.reference.cloud} has no normals")
     processes = tuple(_process(lesson, path) for path in job.paths)
-    work = Work(job, lesson, processes, _direction(up))
+    work = Work(job, lesson, processes, *_lying(job, up))
     _check_frame(work)
     return work
 
 
 def _process(lesson: Lesson, path: ToolPath) -> Process:
-    for region in lesson.knowledge.regions:
-        for process in region.processes:
-            if region.name == path.region and process.label == path.process:
-                return process
-    raise ProcessError(
-        f"the job's tool path '{path.process}' on '{path.region}' is not in its {KNOWLEDGE}; "
-        "transfer it again"
-    )
+    regions = [region for region in lesson.knowledge.regions if region.name == path.region]
+    made = [p for region in regions for p in region.processes if p.label == path.process]
+    if len(made) == 1:
+        return made[0]
+    what = f"the job's tool path '{path.process}' on '{path.region}'"
+    if made:  # an early job: since then each has a label of its own
+        raise ProcessError(
+            f"{what} may be of {len(made)} processes of that name in its {KNOWLEDGE}; transfer it "
+            "again, or name each of them"
+        )
+    raise ProcessError(f"{what} is not in its {KNOWLEDGE}; transfer it again")
 
 
-def _direction(up: str | np.ndarray) -> np.ndarray:
-    if isinstance(up, str):
-        sign = -1.0 if up.startswith("-") else 1.0
-        name = up.removeprefix("-")
-        if name not in ("x", "y", "z"):
-            raise ProcessError(f"up is '{up}'; give x, y, z, -x, -y or -z")
-        return sign * np.eye(3)["xyz".index(name)]
-    return np.asarray(up, float) / np.linalg.norm(up)
+def _lying(job: Job, up: str | None) -> tuple[np.ndarray, str, bool]:
+    """`Work.upright`, where it is from, and whether it is assumed."""
+    if up is not None:
+        return upright_turn(up_axis(up), job.forward), f"up is {up}, as given", False
+    upright = upright_turn(job.up, job.forward)
+    if job.pose is None:
+        said = "the job does not say how its object lies: taken to have +Y up and +X ahead"
+        return upright, said, True
+    return upright, "the object stands as the job's pose says", False
 
 
 def _check_frame(work: Work) -> None:
@@ -184,7 +194,7 @@ def simulate(
     clock("shape")
     progress("placement")
     every = [(path, lines_of(path)) for path in work.job.paths]
-    placement, reachable = find_placement(arm, every, solid, work.up, placement, turns, rng)
+    placement, reachable = find_placement(arm, every, solid, work.upright, placement, turns, rng)
     if reachable == 0.0:
         raise RobotError(
             f"the arm '{arm.name}' reaches none of the job's waypoints from its base at "
@@ -198,7 +208,7 @@ def simulate(
     for path, process in zip(work.job.paths, work.processes, strict=True):
         where = f"{path.region}, {path.process}"
         progress(f"{where}: inverse kinematics")
-        cell = Cell.build(arm, tool_of(path), solid, placement, work.up)
+        cell = Cell.build(arm, tool_of(path), solid, placement, work.upright)
         if library is None or not np.array_equal(library.T_flange_tcp, cell.tool.T_flange_tcp):
             library = Library.build(cell, LIBRARY_SIZE, rng)
         lines = lines_of(path)

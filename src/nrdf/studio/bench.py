@@ -127,7 +127,7 @@ class Bench:
         except ProcessError as error:
             return Plan(str(error))
         indices = np.flatnonzero(region.mask)
-        checked = check_process(body.surface, region.name, indices, process)
+        checked = check_process(body.surface, region.name, indices, process, body.given)
         return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
 
     # --- targets

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
 from nrdf.geometry import estimate_normals, thin
+from nrdf.process.given_surface import GivenSurface, given_surface
 from nrdf.process.surface import Surface
 from nrdf.regions.model import WORKING_POINTS
 from nrdf.studio.painting import Canvas
@@ -37,6 +39,12 @@ class Body:
     def canvas(self) -> Canvas:
         """The shown points, to be painted on."""
         return Canvas(self.surface)
+
+    @cached_property
+    def given(self) -> GivenSurface:
+        """The object as it was given, to judge tool paths by."""
+        normals = self.normals[self._follows] if self.cloud.normals is None else self.cloud.normals
+        return given_surface(replace(self.cloud, normals=normals))
 
     @cached_property
     def _follows(self) -> np.ndarray:

@@ -116,12 +116,14 @@ class ProcessTab:
         if plan.fault or plan.checked is None or plan.checked.measures is None:
             return f"⚠ {_labelled(plan.fault)}"
         measures = plan.checked.measures
-        coverage, widest, off, axis, _ = short_figures(vars(measures))
+        shares, widest, jump, off, axis, _ = short_figures(vars(measures))
+        step, turn = jump.split(" · ")
         minutes, seconds = divmod(round(measures.cycle_time_s), 60)
         lines = [
             f"**{measures.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
-            f"**{coverage}** covered",
-            f"lines at most {widest} apart, {off} off the surface, axis {axis} off",
+            f"**{shares}** worked · left out · unreached",
+            f"lines at most {widest} apart, {off} off the object, axis {axis} off; steps of at "
+            f"most {step}, turns of at most {turn}",
         ]
         lines += [f"⚠ {warning}" for warning in plan.checked.warnings]
         return "  \n".join(lines)

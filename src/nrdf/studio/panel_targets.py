@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nrdf.errors import NrdfError
 from nrdf.process.limits import DOUBTFUL, Limits
-from nrdf.process.report import report_of
+from nrdf.process.report import report_of, shares_in_words
 from nrdf.studio.colours import COLOURINGS
 from nrdf.studio.panel_object import AS_IN_FILE, unit_of
 from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled, read_upload
@@ -69,12 +69,12 @@ class TargetsTab:
         count = report["total"]["paths"]
         paths = "1 tool path" if count == 1 else f"{count} tool paths"
         head = f"**{key}**{old}: {paths}, {minutes} min {seconds} s"
-        rows = ["| region | process | sure | covered |", "|---|---|---|---|"]
+        rows = ["| region | process | sure | worked · left out · unreached |", "|---|---|---|---|"]
         for path in report["paths"]:
             region = report["regions"][path["region"]]
             confidence = region["confidence"]
             doubted = not region["found"] or confidence < DOUBTFUL
-            covered = f"{path['measures']['coverage']:.1%}" if path["planned"] else "–"
+            covered = shares_in_words(path["measures"]) if path["planned"] else "–"
             flag = "⚠ " if doubted else ""
             rows.append(
                 f"| {flag}{path['region']} | {path['process']} | {confidence:.2f} | {covered} |"

@@ -211,7 +211,7 @@ def _standing(simulated: Simulated) -> list[Shape]:
 def _upright(simulated: Simulated) -> np.ndarray:
     """T_cell_object (4, 4) before the turntable has turned."""
     place = simulated.placement
-    poses = place.T_cell_object(simulated.solid, simulated.work.up)
+    poses = place.T_cell_object(simulated.solid, simulated.work.upright)
     back = np.eye(4)
     back[:3, :3] = Rotation.from_euler("z", -place.turns_rad[0]).as_matrix()
     return np.asarray(back @ poses[0])

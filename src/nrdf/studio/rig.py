@@ -67,6 +67,7 @@ class Rig:
         """Stand where the object, not turned, is at `offset` (3,) in the scene."""
         place = _CELL @ self.playback.T_cell_object[:3, 3] * self._factor
         self._object, self._origin = place, offset - place
+        self._upright = _CELL @ self.playback.T_cell_object[:3, :3]
         self._root.position = tuple(self._origin)
         self.show(max(self._at, 0))
 
@@ -75,8 +76,8 @@ class Rig:
         playback = self.playback
         angle = float(playback.turn_rad[at])
         # The turntable's axis goes through the cell's origin.
-        offset = self._origin + about_up(angle) @ self._object
-        self.figure.stand(offset, angle)
+        turn = about_up(angle)
+        self.figure.stand(self._origin + turn @ self._object, turn @ self._upright)
         for body, frame in self._bodies.items():
             frame.position = tuple(playback.positions[at, body] * self._factor)
             frame.wxyz = tuple(playback.quaternions_wxyz[at, body])

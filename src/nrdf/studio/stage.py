@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import viser
+from scipy.spatial.transform import Rotation
 
 from nrdf.process.surface import unit
-from nrdf.similarity import about_up
 from nrdf.studio.body import Body
 from nrdf.studio.view import View, hit
 
@@ -84,11 +84,11 @@ class Figure:
         middle = (self.body.low + self.body.high) / 2
         return np.array([middle[0], self.body.high[1], middle[2]])
 
-    def stand(self, offset: np.ndarray, turn_rad: float = 0.0) -> None:
-        """Move the object, turned about its upright axis; offset (3,) in the scene."""
-        self.offset, self._rotation = offset, about_up(turn_rad)
+    def stand(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
+        """Move the object; offset (3,) in the scene, rotation (3, 3) from its own frame."""
+        self.offset, self._rotation = offset, np.eye(3) if rotation is None else rotation
         self.frame.position = tuple(offset)
-        self.frame.wxyz = (np.cos(turn_rad / 2), 0.0, np.sin(turn_rad / 2), 0.0)
+        self.frame.wxyz = tuple(np.roll(Rotation.from_matrix(self._rotation).as_quat(), 1))
 
     def paint(self, colours: np.ndarray) -> None:
         """Colours (k, 3) uint8 of the shown points, which are shaded here."""
