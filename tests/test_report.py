@@ -90,5 +90,9 @@ def test_figures_are_shown_as_people_read_them():
         "time": "50 s",
     }
     alone = vars(replace(MEASURES, line_spacing_worst_m=None))
-    assert short_figures(alone)[SHORT_FIGURES.index("widest lines")] == "–"
+    assert short_figures(alone)[SHORT_FIGURES.index("lines, mm")] == "–"
     assert figures(alone)[2] == "–"
+    assert dict(zip(SHORT_FIGURES, short_figures(vars(MEASURES)), strict=True)) == {
+        "worked, %": "99.5", "left out, %": "0.0", "missed, %": "0.5", "lines, mm": "42.0",
+        "step, mm": "21.0", "turn, °": "1", "off, mm": "0.6", "time, s": "50",
+    }  # fmt: skip

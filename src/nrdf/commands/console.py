@@ -35,12 +35,13 @@ def versions() -> dict[str, str]:
 
 def table(title: str, *columns: str, texts: int = 1) -> Table:
     """A plain table; the first `texts` columns and those without a heading are text, the others
-    numbers."""
+    numbers, with the unit that stands behind a comma in a heading below it."""
     made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
     made.show_header = any(columns)
     for i, column in enumerate(columns):
         justify: JustifyMethod = "right" if i >= texts and column else "left"
-        made.add_column(column, justify=justify, header_style="dim")
+        heading = column if i < texts else column.replace(", ", "\n")
+        made.add_column(heading, justify=justify, header_style="dim")
     return made
 
 

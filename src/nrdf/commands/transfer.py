@@ -12,6 +12,8 @@ from nrdf.bounds import NotNegative, Share, Within
 from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, stand_ins
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
 
+_NAME_WIDTH = 12  # characters
+
 if TYPE_CHECKING:
     from nrdf.scans.target import AlignedScan
 
@@ -165,12 +167,14 @@ def show_transfer(report: dict[str, Any]) -> None:
     from nrdf.process.report import SHORT_FIGURES, short_figures
 
     none = ["–"] * len(SHORT_FIGURES)
-    shown = table("", "region", "process", "confidence", *SHORT_FIGURES, texts=2)
+    shown = table("", "region", "process", "sure", *SHORT_FIGURES, texts=2)
     for path in report["paths"]:
         confidence = f"{report['regions'][path['region']]['confidence']:.2f}"
         cells = short_figures(path["measures"]) if path["planned"] else none
         style = None if path["planned"] else "dim"
         shown.add_row(path["region"], path["process"], confidence, *cells, style=style)
+    longest = max((len(path["region"]) for path in report["paths"]), default=0)
+    shown.columns[0].no_wrap = longest <= _NAME_WIDTH  # else it would be the first to be broken
     show(shown)
     for warning in report["warnings"]:
         errors.print(warning, style="yellow")

@@ -37,7 +37,8 @@ p { margin: 4px 0; } .soft { color: var(--soft); }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 th { font-weight: 600; font-size: 12.5px; color: var(--soft); text-align: right;
   vertical-align: bottom; }
-td, th { padding: 6px 8px; border-bottom: 1px solid var(--line); white-space: nowrap; }
+td, th { padding: 6px 8px; border-bottom: 1px solid var(--line); }
+td { white-space: nowrap; }
 td { text-align: right; } td.text, th.text { text-align: left; }
 td.off { color: var(--bad); font-weight: 600; } tr.none td { color: var(--soft); }
 i.dot { display: inline-block; width: 11px; height: 11px; border-radius: 3px; margin-right: 7px; }

@@ -20,9 +20,11 @@ FIGURES = (
     "off the planned surface, 99 % · worst", "axis off, 99 %", "length", "time",
 )  # fmt: skip
 SHORT_FIGURES = (
-    "worked · left out · unreached", "widest lines", "step · turn", "off object", "axis off",
-    "time",
+    "worked, %", "left out, %", "missed, %", "lines, mm", "step, mm", "turn, °", "off, mm",
+    "time, s",
 )  # fmt: skip
+"""Shares of the whole region; the widest place between lines; the largest step and turn between
+waypoints; the distance from the object as given, 95th percentile."""
 _MOST_UNREACHED = 0.03
 _LARGEST_STEP = 2.0  # times the spacing of waypoints
 _LARGEST_TURN_RAD = np.radians(30.0)
@@ -175,29 +177,32 @@ def shares_in_words(measures: Mapping[str, Any]) -> str:
     return " · ".join(f"{100.0 * share:.1f}" for share in shares) + " %"
 
 
+def jump_in_words(measures: Mapping[str, Any]) -> str:
+    """The largest step between neighbouring waypoints, and the largest turn."""
+    turn = f"{np.degrees(measures['turn_worst_rad']):.0f}°"
+    return f"{_millimetres(measures['step_worst_m'])} · {turn}"
+
+
 def figures(measures: Mapping[str, Any]) -> list[str]:
     """A tool path's measures as people read them, one for each of `FIGURES`."""
-    shares, _, jump, _, axis, time = short_figures(measures)
-    length = f"{measures['process_length_m']:.2f} m"
+    length, time = f"{measures['process_length_m']:.2f} m", f"{measures['cycle_time_s']:.0f} s"
     spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
     true = _millimetres(measures["true_distance_95_m"], measures["true_distance_worst_m"])
     away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
+    shares, overlap = shares_in_words(measures), f"{measures['overlap']:.0%}"
+    axis = f"{np.degrees(measures['axis_error_99_rad']):.1f}°"
+    jump = jump_in_words(measures)
     jump += f" · {np.degrees(measures['bend_worst_rad_m']) / 1e3:.1f}°/mm"
-    overlap = f"{measures['overlap']:.0%}"
     return [shares, overlap, spacing, jump, true, away, axis, length, time]
 
 
 def short_figures(measures: Mapping[str, Any]) -> list[str]:
-    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`: off object is
-    the 95th percentile."""
-    return [
-        shares_in_words(measures),
-        _millimetres(measures["line_spacing_worst_m"]),
-        f"{_millimetres(measures['step_worst_m'])} · {np.degrees(measures['turn_worst_rad']):.0f}°",
-        _millimetres(measures["true_distance_95_m"]),
-        f"{np.degrees(measures['axis_error_99_rad']):.1f}°",
-        f"{measures['cycle_time_s']:.0f} s",
-    ]
+    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+    shares = shares_in_words(measures).removesuffix(" %").split(" · ")
+    lengths = ("line_spacing_worst_m", "step_worst_m", "true_distance_95_m")
+    spacing, step, off = (_millimetres(measures[name]).removesuffix(" mm") for name in lengths)
+    turn, time = np.degrees(measures["turn_worst_rad"]), measures["cycle_time_s"]
+    return [*shares, spacing, step, f"{turn:.0f}", off, f"{time:.0f}"]
 
 
 def _millimetres(*lengths: float | None) -> str:

@@ -116,14 +116,13 @@ class ProcessTab:
         if plan.fault or plan.checked is None or plan.checked.measures is None:
             return f"⚠ {_labelled(plan.fault)}"
         measures = plan.checked.measures
-        shares, widest, jump, off, axis, _ = short_figures(vars(measures))
-        step, turn = jump.split(" · ")
+        worked, left_out, missed, widest, step, turn, off, _ = short_figures(vars(measures))
         minutes, seconds = divmod(round(measures.cycle_time_s), 60)
         lines = [
             f"**{measures.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
-            f"**{shares}** worked · left out · unreached",
-            f"lines at most {widest} apart, {off} off the object, axis {axis} off; steps of at "
-            f"most {step}, turns of at most {turn}",
+            f"of the region **{worked} %** worked, {left_out} % left out, {missed} % missed",
+            f"lines at most {widest} mm apart, {off} mm off the object; steps of at most {step} "
+            f"mm, turns of at most {turn}°",
         ]
         lines += [f"⚠ {warning}" for warning in plan.checked.warnings]
         return "  \n".join(lines)
