@@ -134,6 +134,28 @@ def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
     assert "asked for" in said.out and "nothing is wrong" not in said.out
 
 
+def test_check_finds_a_category_that_no_model_is_for(taught, untrained, capsys):
+    path = taught / "box.yaml"
+    path.write_text(path.read_text().replace("category: chair", "category: chiar", 1))
+    assert cli.run(["knowledge", "check", str(path)]) == 2
+    assert "category: no model for the category 'chiar'; did you mean" in capsys.readouterr().err
+    assert cli.run(["knowledge", "check", str(path), "--model", str(untrained)]) == 2
+    assert "is for chair" in capsys.readouterr().err
+    text = path.read_text()
+    path.write_text(text.replace("allow_unusual: false", "allow_unusual: true", 1))
+    assert path.read_text() != text
+    assert cli.run(["knowledge", "check", str(path)]) == 0
+
+
+def test_new_takes_an_unusual_category_where_it_is_meant(files, capsys):
+    words = f"knowledge new --reference {files}/box.ply --category sofa --out {files}/sofa.yaml"
+    words += f" --region {files}/top.ply"
+    assert cli.run(words.split()) == 2
+    assert "--model" in capsys.readouterr().err and not (files / "sofa.yaml").exists()
+    assert cli.run([*words.split(), "--allow-unusual"]) == 0
+    assert cli.run(["knowledge", "check", str(files / "sofa.yaml")]) == 0
+
+
 def test_json_and_its_schema(taught, tmp_path, capsys):
     words = f"knowledge new --reference {taught}/box.ply --category chair --out {taught}/box.json"
     assert cli.run([*words.split(), "--region", str(taught / "top.ply")]) == 0
@@ -142,6 +164,8 @@ def test_json_and_its_schema(taught, tmp_path, capsys):
     capsys.readouterr()
     assert cli.run(["knowledge", "schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
+    feed = schema["$defs"]["Process"]["properties"]["feed_m_s"]["description"]
+    assert feed.endswith("Plausible: 0.0001 to 5.")
     assert schema["properties"]["regions"] and "2020-12" in schema["$schema"]
     assert cli.run(["knowledge", "schema", "--out", str(tmp_path / "s.json")]) == 0
     assert json.loads((tmp_path / "s.json").read_text()) == schema

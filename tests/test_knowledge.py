@@ -13,7 +13,12 @@ from pydantic import ValidationError
 from nrdf.errors import ProcessError
 from nrdf.process import knowledge_file, plan
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Trajectory
-from nrdf.process.knowledge_file import parse_knowledge, read_knowledge, write_knowledge
+from nrdf.process.knowledge_file import (
+    parse_knowledge,
+    read_knowledge,
+    validated,
+    write_knowledge,
+)
 from nrdf.units import METRES
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
@@ -114,6 +119,91 @@ def test_a_process_that_makes_no_sense_is_explained_by_field_and_value(change, m
     with pytest.raises(ProcessError) as caught:
         parsed(process=given)
     assert message in str(caught.value)
+
+
+IMPLAUSIBLE = [
+    ({"feed_mm_s": 120_000}, "feed_m_s is 120 (120000 mm/s), above what is plausible, 5 (5000"),
+    ({"feed_mm_s": 0.01}, "feed_m_s is 1e-05 (0.01 mm/s), below what is plausible, 0.0001"),
+    ({"force_n": 20_000}, "force_n is 20000 (20000 N), above what is plausible, 500 (500 N)"),
+    ({"dwell_s": 1e9}, "dwell_s is 1e+09 (1000000000 s), above what is plausible, 3600 (3600 s)"),
+    ({"approach": {"distance_m": 1000}}, "approach.distance_m is 1000 (1000000 mm), above"),
+    ({"retract": {"feed_m_s": 9}}, "retract.feed_m_s is 9 (9000 mm/s), above"),
+    ({"standoff_m": 2}, "standoff_m is 2 (2000 mm), above what is plausible, 1 (1000 mm)"),
+    ({"stepover_mm": 1e-3}, "stepover_m is 1e-06 (0.001 mm), below what is plausible, 0.0001"),
+    ({"stepover_mm": None, "overlap": 0.999999},
+     "with overlap 0.999999, stepover_m is 5e-08 (5e-05 mm), below what is plausible"),
+    ({"spacing_m": 2}, "spacing_m is 2 (2000 mm), above"),
+    ({"edge_margin_m": 3}, "edge_margin_m is 3 (3000 mm), above"),
+    ({"tool": {"radius_m": 1e-9}}, "tool.radius_m is 1e-09 (1e-06 mm), below"),
+    ({"tool": {"radius_m": 25}}, "tool.radius_m is 25 (25000 mm), above"),
+    ({"tool": {"radius_m": 0.02, "clearance_m": 20}}, "tool.clearance_m is 20 (20000 mm), above"),
+    ({"tool": {"radius_m": 0.02, "tcp_m": [0, 0, -80]}}, "tool.tcp_m is -80 (-80000 mm), below"),
+    ({"passes": 500}, "passes is 500 (500), above what is plausible, 100"),
+    ({"lead_deg": 80}, "lead_rad is 1.39626 (80°), above what is plausible, 1.0472 (60°)"),
+    ({"spindle_rpm": 1e6}, "spindle_rad_s is 104720 (1000000 rpm), above"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "message"), IMPLAUSIBLE)
+def test_what_no_process_has_is_refused_with_its_unit_unless_it_is_meant(change, message):
+    given = {key: value for key, value in {**SAND, **change}.items() if value is not None}
+    with pytest.raises(ProcessError, match="set allow_unusual: true in the process") as caught:
+        parsed(process=given)
+    assert message in str(caught.value)
+    assert parsed(process={**given, "allow_unusual": True})
+
+
+def test_all_that_is_implausible_is_said_at_once():
+    given = {"kind": "sand", "tool": {"radius_mm": 25}, "feed_m_s": 120, "force_n": 900}
+    with pytest.raises(ProcessError, match=r"force_n is 900 .*feed_m_s is 120 .*overlap") as caught:
+        parsed(process={**given, "overlap": 0.9999})
+    assert str(caught.value).count("allow_unusual") == 1
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"x": math.nan}, "numbers must be finite, not nan"),
+        ({"x": [{"y": math.inf}]}, "numbers must be finite, not inf"),
+        ({"x": "\ud800"}, "surrogate"),
+        ({"x": {1, 2}}, "not set"),
+        ({"x": b"1"}, "not bytes"),
+    ],
+)
+def test_parameters_are_what_every_file_can_hold(parameters, message):
+    with pytest.raises(ProcessError, match=message):
+        validated(content(process={**SAND, "parameters": parameters}), "k")
+
+
+@pytest.mark.parametrize("name", ["", "a\0b", "\ud800", "a" * 5000])
+def test_names_that_no_file_can_have_are_refused(name):
+    for changes in ({"reference": {"cloud": name}}, {"region": {"file": name}}):
+        with pytest.raises(ProcessError, match=r"reference\.cloud|region 'seat', file"):
+            parsed(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"region": {"indices": [10**30]}}, "indices.0: must be"),
+        ({"reference": {"points_m": [[1e300, 0, 0]]}}, "points_m.0.0: must be at most 1000000"),
+        ({"regions": [{"name": f"r{k}", "indices": [1], "processes": [SAND]} for k in range(501)]},
+         "at most 500 items"),
+        ({"region": {"mask": ["x"] * 100_000}}, "region 'seat', mask.0: "),
+    ],
+)  # fmt: skip
+def test_numbers_and_lists_are_bounded(changes, message):
+    with pytest.raises(ProcessError, match=message) as caught:
+        parsed(**changes)
+    assert len(str(caught.value)) < 1000
+
+
+def test_thousands_of_faults_make_a_short_message():
+    with pytest.raises(ProcessError) as caught:
+        parsed(**{f"k{number}" + "x" * 1000: 1 for number in range(5000)})
+    said = str(caught.value).splitlines()
+    assert said[0] == "k.yaml: 5000 faults:" and said[-1].strip() == "and 4988 more"
+    assert len(said) == 14 and max(map(len, said)) < 500
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,8 @@ def test_a_good_process_is_planned_and_measured():
     ("change", "message"),
     [
         ({"edge_margin_mm": 400}, "edge_margin_m is 0.4, which leaves nothing of the region"),
-        ({"stepover_mm": 2000}, "stepover_m is 2, wider than the region, which measures 0.9"),
+        ({"stepover_mm": 950}, "stepover_m is 0.95, wider than the region, which measures 0.9"),
+        ({"spacing_mm": 950}, "spacing_m is 0.95 (950 mm), longer than the region, 9"),
         ({"direction": [0, 1, 0]}, "stands on the region instead of running along it"),
         (
             {"trajectory": "taught", "waypoints": [{"positions_m": [[0, 0.3, 0], [0, 0.7, 0]]}]},
@@ -47,6 +48,11 @@ def test_what_can_be_done_but_is_doubtful_is_said(change, message):
     given = {key: value for key, value in {**SAND, **change}.items() if value is not None}
     (row,) = check(lesson({"top": [given]}))
     assert any(message in line for line in row.warnings) and row.fault == ""
+
+
+def test_a_spacing_longer_than_the_region_may_be_meant():
+    row = checked(spacing_mm=950, allow_unusual=True)
+    assert row.fault == "" and row.measures.coverage > 0.9
 
 
 def test_taught_lines_are_measured_as_they_are():

@@ -5,6 +5,8 @@ import pytest
 
 from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import ProcessError, RegionError
+from nrdf.process import category
+from nrdf.process.category import check_category
 from nrdf.process.knowledge_check import check
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
 from nrdf.process.knowledge_new import KINDS, PLACEHOLDER, new_knowledge
@@ -89,3 +91,23 @@ def test_mistakes_are_explained(files):
     write_cloud(files / "off.ply", PointCloud(cloud().points[:9] + 5))
     with pytest.raises((ProcessError, RegionError), match="'off': 9 of the region's 9 points are"):
         new(files, "off")
+
+
+def test_a_category_that_no_model_is_for_is_offered_the_nearest(files, untrained):
+    reference = files / "scans" / "box.ply"
+    message = r"no model for the category 'chiar'; did you mean 'chair'\? \(known: car, chair"
+    with pytest.raises(ProcessError, match=message):
+        new_knowledge(reference, "chiar", files)
+    meant = new_knowledge(reference, "chiar", files, allow_unusual=True, unit="m")
+    assert meant.allow_unusual and meant.category == "chiar"
+    assert not new_knowledge(reference, "chair", files).allow_unusual
+    assert not new_knowledge(reference, "table", files).allow_unusual  # a family, to train with
+    with pytest.raises(ProcessError, match=r"category is 'chiar', but the model .* is for chair"):
+        new_knowledge(reference, "chiar", files, model=str(untrained), allow_unusual=True)
+
+
+def test_a_category_of_ones_own_is_right_where_a_model_is_given(files, untrained, monkeypatch):
+    monkeypatch.setattr(category, "known_categories", lambda: ["car"])
+    check_category("chair", untrained)
+    with pytest.raises(ProcessError, match="known: car"):
+        check_category("chair")

@@ -107,8 +107,13 @@ def in_words(name: str, value: float) -> str:
     """A quantity as people read it: ``in_words("stepover_m", 0.015)`` is "15 mm"."""
     for ending, factor, unit in _SHOWN:
         if name.endswith(ending):
-            return f"{value * factor:.4g}{unit}"
-    return f"{value:.4g}"
+            return f"{_four_digits(value * factor)}{unit}"
+    return _four_digits(value)
+
+
+def _four_digits(value: float) -> str:
+    """Rounded to four digits; large ones without an exponent, which few read as a length."""
+    return f"{float(f'{value:.4g}'):.10g}"
 
 
 def _times(value: Any, factor: float) -> Any:
@@ -117,5 +122,5 @@ def _times(value: Any, factor: float) -> Any:
     try:
         # Digits of the decimal number that was meant, not of the factor's rounding.
         return value if isinstance(value, bool) else float(f"{float(value) * factor:.15g}")
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return value

@@ -33,6 +33,8 @@ def new(
     region: tuple[Path, ...] = (),
     kind: tuple[str, ...] = ("sand",),
     unit: Literal["m", "cm", "mm", "in"] | None = None,
+    model: str | None = None,
+    allow_unusual: bool = False,
     overwrite: bool = False,
 ) -> None:
     """Begin a knowledge file: commented, to be filled in.
@@ -45,11 +47,13 @@ def new(
 
     Args:
         reference: Cloud or mesh of the object that is taught: +X forward, +Y up.
-        category: chair, car, plane, or what a model was trained on.
+        category: chair, car, plane, or what a model was trained on; of the latter give --model.
         out: File to write.
         region: Region files, as `nrdf retrieve` takes them.
         kind: sand, polish, oil, paint, clean, inspect or custom; one a region, or one for all.
         unit: Of the reference's file, where it does not say.
+        model: Weight file or training run for a category that the zoo has no model for.
+        allow_unusual: Take a category that no model is known for yet.
         overwrite: Replace the file if there is one.
     """
     from nrdf.errors import OutputError
@@ -58,7 +62,9 @@ def new(
 
     if out.exists() and not overwrite:
         raise OutputError(f"{out} exists; give another name, or --overwrite to replace it")
-    content = new_knowledge(reference, category, out.parent, region, kind, unit)
+    content = new_knowledge(
+        reference, category, out.parent, region, kind, unit, model, allow_unusual
+    )
     write_knowledge(out, content, explained=True)
     console.print(f"wrote {out}")
     if not region:
@@ -69,7 +75,7 @@ def new(
     console.print(f"nrdf knowledge check {out}")
 
 
-def check(file: Positional[Path]) -> None:
+def check(file: Positional[Path], model: str | None = None) -> None:
     """Show what a knowledge file says, and whether it is right.
 
     Every field is checked, the regions are looked for on the reference, and every process is
@@ -79,8 +85,10 @@ def check(file: Positional[Path]) -> None:
 
     Args:
         file: The knowledge file, YAML or JSON.
+        model: Weight file or training run for a category that the zoo has no model for.
     """
     from nrdf.errors import ProcessError
+    from nrdf.process.category import check_category
     from nrdf.process.knowledge_check import check as check_on_reference
     from nrdf.process.knowledge_file import listed
     from nrdf.process.lesson import read_lesson
@@ -103,6 +111,11 @@ def check(file: Positional[Path]) -> None:
         for warning in row.warnings:
             errors.print(f"{row.where}: {warning}", style="yellow")
     faults = [f"{row.where}: {row.fault}" for row in checked if row.fault]
+    try:
+        if model is not None or not lesson.knowledge.allow_unusual:
+            check_category(lesson.knowledge.category, model)
+    except ProcessError as error:
+        faults.insert(0, f"category: {error}")
     if faults:
         raise ProcessError(listed(str(file), faults))
     console.print(f"{len(checked)} processes on {len(lesson.regions)} regions: nothing is wrong")

@@ -117,6 +117,7 @@ def _knowledge(transferred: Transferred, folder: Path, origin: Mapping[str, Any]
     return Knowledge(
         category=taught.category,
         reference=reference,
+        allow_unusual=taught.allow_unusual,
         allow_overlap=taught.allow_overlap or bool(overlaps(found)),
         regions=regions,
         origin={key: origin[key] for key in keys if key in origin},

@@ -16,13 +16,17 @@ from pydantic import AfterValidator, Field, model_validator
 from nrdf.process.quantities import (
     Angle,
     Direction,
+    FileName,
     Name,
     NotNegative,
     Number,
+    PlainMapping,
     Positive,
     Quantities,
     Quaternion,
+    Usual,
     Vector,
+    implausible,
 )
 from nrdf.regions.region import REGION_NAME
 
@@ -33,6 +37,11 @@ Transfer = Literal["replan", "carry"]
 _ROOM = 190  # characters of a name to which a number is added
 WITHOUT_CONTACT = ("paint", "inspect")
 """Kinds of process that touch nothing, so have no contact force."""
+
+
+_FEED, _LENGTH = Usual(1e-4, 5.0), Usual(0.0, 1.0)
+_SPACING = Usual(1e-4, 1.0)
+_LEANING = Usual(-math.pi / 3, math.pi / 3)
 
 
 def _region_name(text: str) -> str:
@@ -48,12 +57,12 @@ class Tool(Quantities):
 
     name: Name = "tool"
     """Its name, for the robot's program."""
-    radius_m: Positive
+    radius_m: Annotated[Positive, Usual(1e-4, 0.5)]
     """Radius of its footprint on the surface."""
-    clearance_m: NotNegative = 0.0
+    clearance_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Free room that it needs before the surface, along the normal; a strategy leaves out places
     that have less, such as crevices. 0: not looked at."""
-    tcp_m: Vector | None = None
+    tcp_m: Annotated[Vector | None, Usual(-2.0, 2.0)] = None
     """Tool centre point in the robot's flange frame."""
     tcp_quaternion_xyzw: Quaternion | None = None
     """Rotation from the tool frame (z into the part) to the flange frame."""
@@ -62,20 +71,20 @@ class Tool(Quantities):
 class FreeMove(Quantities):
     """How a line is approached, or left."""
 
-    distance_m: NotNegative = 0.05
+    distance_m: Annotated[NotNegative, _LENGTH] = 0.05
     """Length of the move."""
     angle_rad: Annotated[Number, Field(ge=0, le=math.pi / 2)] = 0.0
     """Its angle from the surface's normal: 0 straight down, 90° along the surface."""
-    feed_m_s: Positive = 0.1
+    feed_m_s: Annotated[Positive, _FEED] = 0.1
     """Its speed."""
 
 
 class Line(Quantities):
     """A taught line (stroke): waypoints in the order in which they are driven."""
 
-    positions_m: list[Vector] = Field(min_length=1)
+    positions_m: Annotated[list[Vector], Field(fail_fast=True)] = Field(min_length=1)
     """Tool centre points in the reference's frame."""
-    quaternions_xyzw: list[Quaternion] | None = None
+    quaternions_xyzw: Annotated[list[Quaternion], Field(fail_fast=True)] | None = None
     """Rotation from the tool frame (z into the part, x along the travel) to the reference's frame,
     one a waypoint; without them the tool follows the surface, lead and tilt."""
 
@@ -97,7 +106,7 @@ class Process(Quantities):
     """sand, polish, oil, paint, clean, inspect or custom."""
     name: Name | None = None
     """What people call it ("sand, 120 grit"); needed where kind is custom."""
-    order: int = 0
+    order: Annotated[int, Field(ge=-(10**6), le=10**6)] = 0
     """Lower numbers first, over all regions; equal ones as they stand in the file."""
     transfer: Transfer | None = None
     """replan: plan the strategy anew on the new object; carry: take every waypoint over.
@@ -106,41 +115,43 @@ class Process(Quantities):
     """raster, cross-hatch, spiral, contour, or taught with its own waypoints."""
     direction: Direction | None = None
     """Along the lines of a raster, in the reference's frame; unless given, the longest way."""
-    stepover_m: Positive | None = None
+    stepover_m: Annotated[Positive | None, _SPACING] = None
     """Distance between neighbouring lines, along the surface."""
     overlap: Annotated[Number, Field(ge=0, lt=1)] | None = None
     """Instead of the stepover: share of the footprint that neighbouring lines have in common."""
-    spacing_m: Positive = 0.01
+    spacing_m: Annotated[Positive, _SPACING] = 0.01
     """Distance between waypoints along a line."""
-    edge_margin_m: NotNegative = 0.0
+    edge_margin_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Kept free inside the region's border."""
-    passes: Annotated[int, Field(ge=1, le=1000)] = 1
+    passes: Annotated[int, Field(ge=1, le=1000), Usual(1, 100)] = 1
     """How often the region is worked."""
     tool: Tool
     """The tool."""
-    lead_rad: Angle = 0.0
+    lead_rad: Annotated[Angle, _LEANING] = 0.0
     """The tool axis leans by this against the normal, its tail towards where it travels."""
-    tilt_rad: Angle = 0.0
+    tilt_rad: Annotated[Angle, _LEANING] = 0.0
     """The tool axis leans by this sideways."""
-    standoff_m: NotNegative = 0.0
+    standoff_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Height of the tool centre point over the surface; 0 where the tool touches it."""
-    force_n: Positive | None = None
+    force_n: Annotated[Positive | None, Usual(0.01, 500.0)] = None
     """Contact force along the tool axis; leave it out where nothing is touched."""
     force_tolerance_n: Positive | None = None
     """How far the force may be off."""
-    feed_m_s: Positive
+    feed_m_s: Annotated[Positive, _FEED]
     """Speed of the tool centre point along the lines."""
-    spindle_rad_s: NotNegative | None = None
+    spindle_rad_s: Annotated[NotNegative | None, Usual(0.0, 100_000 * math.pi / 30)] = None
     """Speed of the spindle."""
-    dwell_s: NotNegative = 0.0
+    dwell_s: Annotated[NotNegative, Usual(0.0, 3600.0)] = 0.0
     """Pause at the end of each line."""
     approach: FreeMove = FreeMove()
     """The free move to a line."""
     retract: FreeMove = FreeMove()
     """The free move away from a line."""
-    waypoints: list[Line] | None = None
+    waypoints: Annotated[list[Line], Field(fail_fast=True)] | None = None
     """The lines of a taught trajectory."""
-    parameters: dict[str, Any] = Field(default={})
+    allow_unusual: bool = False
+    """Whether values beyond what is plausible (a feed above 5 m/s, say) are meant."""
+    parameters: PlainMapping = Field(default={})
     """Anything else that the process needs, passed on as it is."""
 
     @property
@@ -176,7 +187,21 @@ class Process(Quantities):
             self._contact_makes_sense(self.force_n)
         elif self.force_tolerance_n is not None:
             raise ValueError("force_tolerance_n needs force_n")
+        if not self.allow_unusual:
+            self._is_plausible()
         return self
+
+    def _is_plausible(self) -> None:
+        lines = implausible(self)
+        if self.stepover_m is None and self.overlap is not None:
+            between = self.distance_between_lines_m
+            fault = _SPACING.fault("stepover_m", between)
+            lines += [f"with overlap {self.overlap:g}, {fault}"] if fault else []
+        if lines:
+            raise ValueError(
+                "; ".join(lines) + ". Is the unit right? If it is meant, set allow_unusual: true "
+                "in the process"
+            )
 
     def _taught_makes_sense(self) -> None:
         if not self.waypoints:
@@ -205,21 +230,24 @@ class Process(Quantities):
             )
 
 
+Index = Annotated[int, Field(ge=0, lt=2**31)]
+
+
 class Region(Quantities):
     """A region of the reference, given in one of four ways, and what is done to it."""
 
     name: Annotated[Name, Field(max_length=100), AfterValidator(_region_name)]
     """Its name."""
-    file: str | None = None
+    file: FileName | None = None
     """Cloud of points that lie on the reference, or .npy, .npz of a mask, indices or points; from
     the knowledge file's folder; an .npz of several regions has this one under its name."""
-    mask: list[bool] | None = None
+    mask: Annotated[list[bool], Field(fail_fast=True)] | None = None
     """For each point of the reference whether it belongs to the region."""
-    indices: list[Annotated[int, Field(ge=0)]] | None = None
+    indices: Annotated[list[Index], Field(fail_fast=True)] | None = None
     """Which points of the reference belong to it, counted from 0."""
-    points_m: list[Vector] | None = None
+    points_m: Annotated[list[Vector], Field(fail_fast=True)] | None = None
     """Points that lie on the reference, in its frame."""
-    processes: list[Process] = Field(min_length=1)
+    processes: list[Process] = Field(min_length=1, max_length=100)
     """What is done to it, one after another."""
 
     @property
@@ -254,7 +282,7 @@ class Region(Quantities):
 class Reference(Quantities):
     """The object that the process was taught on: a file, or its points."""
 
-    cloud: str | None = None
+    cloud: FileName | None = None
     """Cloud or mesh; from the knowledge file's folder."""
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
     """Checksum of that file: regions are only right on the cloud that they were taught on."""
@@ -262,9 +290,9 @@ class Reference(Quantities):
     """Unit of the cloud's file, where it does not say."""
     frame: Name | None = None
     """Name of the cloud's coordinate frame, where its file does not say."""
-    points_m: list[Vector] | None = None
+    points_m: Annotated[list[Vector], Field(fail_fast=True)] | None = None
     """Instead of a file: the points themselves."""
-    normals: list[Vector] | None = None
+    normals: Annotated[list[Vector], Field(fail_fast=True)] | None = None
     """Outward unit normals of these points."""
 
     @model_validator(mode="after")
@@ -287,9 +315,11 @@ class Knowledge(Quantities):
     """What the object is: chair, car, plane, or what the model was trained on."""
     reference: Reference
     """The object that it was taught on."""
+    allow_unusual: bool = False
+    """Whether a category that no model is known for is meant; a process says so of its values."""
     allow_overlap: bool = False
     """Whether regions may have points in common."""
-    regions: list[Region] = Field(min_length=1)
+    regions: list[Region] = Field(min_length=1, max_length=500)
     """The process regions of interest (P-ROIs)."""
     origin: dict[str, Any] = Field(default={})
     """Where it comes from; written by transfer."""

@@ -14,6 +14,7 @@ from nrdf.process.coverage import Measures, measure
 from nrdf.process.given_surface import GivenSurface, given_surface
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
+from nrdf.process.patch import patches_of
 from nrdf.process.plan import drive, plan
 from nrdf.process.report import measure_warnings
 from nrdf.process.strategy import strategy_of
@@ -87,6 +88,7 @@ def check_process(
     try:
         strategy = strategy_of(process)
         if process.waypoints is None:
+            _check_spacing(surface, region, process)
             segments = plan(surface, region, strategy)
         else:
             lines = taught_lines(process, surface)
@@ -97,3 +99,14 @@ def check_process(
         return Checked(name, process, str(error), tuple(warnings))
     warnings += measure_warnings(process, measures)
     return Checked(name, process, "", tuple(warnings), measures, tuple(segments))
+
+
+def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:
+    """Raise ProcessError for waypoints farther apart than the region is long, unless meant."""
+    length = max(patch.extent[0] for patch in patches_of(surface, region))
+    if process.spacing_m > length and not process.allow_unusual:
+        spacing = f"{process.spacing_m:g} ({in_words('spacing_m', process.spacing_m)})"
+        raise ProcessError(
+            f"spacing_m is {spacing}, longer than the region, {in_words('length_m', length)}; give "
+            "less, or set allow_unusual: true in the process"
+        )

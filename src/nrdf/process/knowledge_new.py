@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 from nrdf.cloud import check_cloud, read_cloud
 from nrdf.errors import ProcessError, unknown_name
+from nrdf.process.category import check_category, known_categories
 from nrdf.process.knowledge import Kind, Knowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.process.lesson import bind, checksum, known_unit, overlaps
@@ -63,20 +64,25 @@ def new_knowledge(
     regions: Sequence[Path] = (),
     kinds: Sequence[str] = ("sand",),
     unit: str | None = None,
+    model: str | None = None,
+    allow_unusual: bool = False,
 ) -> Knowledge:
     """Knowledge to fill in, for a file in `folder`.
 
     regions: region files, warned about where they overlap; without them there is one placeholder,
     whose file has still to be made. kinds: of the process on each region, or one for all. unit:
-    of the reference, where its file does not say.
+    of the reference, where its file does not say. model: of the category, where the zoo has none.
+    allow_unusual: take a category that no model is known for.
 
-    Raises ProcessError for an unknown kind, kinds that do not fit the regions and an unknown
-    unit; RegionError and CloudError for files that cannot be read, or regions that are not on the
-    reference.
+    Raises ProcessError for an unknown kind or category, kinds that do not fit the regions and an
+    unknown unit; RegionError and CloudError for files that cannot be read, or regions that are not
+    on the reference.
     """
     for kind in kinds:
         if kind not in KINDS:
             raise ProcessError(unknown_name("process kind", kind, KINDS))
+    if model is not None or not allow_unusual:
+        check_category(category, model)
     cloud = read_cloud(reference)
     check_cloud(cloud, MINIMUM_POINTS)
     known = known_unit(cloud, unit, category, str(reference), "--unit")
@@ -92,6 +98,7 @@ def new_knowledge(
     every = list(kinds) * (len(rows) // len(kinds))
     content = {
         "category": category,
+        "allow_unusual": category not in known_categories(),
         "reference": {
             "cloud": _relative(reference, folder),
             "sha256": checksum(reference),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, ConfigDict, Field, GetJsonSchemaHandler, model_validator
@@ -11,7 +12,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from nrdf.strict import Strict
-from nrdf.units import other_names, to_si
+from nrdf.units import in_words, other_names, to_si
 
 _BOUNDS = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
 
@@ -21,6 +22,38 @@ def _name(text: str) -> str:
     if not text.isprintable() or text != text.strip() or not text:
         raise ValueError("a name needs printable characters and no spaces at its ends")
     return text
+
+
+def _file_name(text: str) -> str:
+    if not text or "\0" in text or not _is_writable(text):
+        raise ValueError("a file's name needs characters that a file system takes")
+    return text
+
+
+def _is_writable(text: str) -> bool:
+    """Whether a text has no half of a surrogate pair, which no file can hold."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in text)
+
+
+def _plain(content: Any) -> Any:
+    """Content that every kind of file can hold."""
+    if isinstance(content, dict):
+        for key, value in content.items():
+            _plain(key)
+            _plain(value)
+    elif isinstance(content, (list, tuple)):
+        for value in content:
+            _plain(value)
+    elif isinstance(content, str):
+        if not _is_writable(content):
+            raise ValueError("text with half of a surrogate pair in it")
+    elif isinstance(content, float):
+        if not math.isfinite(content):
+            raise ValueError(f"numbers must be finite, not {content}")
+    elif not isinstance(content, (int, type(None))):
+        kind = type(content).__name__
+        raise ValueError(f"text, numbers, true, false, null, lists and mappings only, not {kind}")
+    return content
 
 
 def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -36,15 +69,37 @@ def _quaternion(q: tuple[float, float, float, float]) -> tuple[float, float, flo
     return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)
 
 
+@dataclass(frozen=True)
+class Usual:
+    """From `least` to `most` a quantity is plausible; what is not has to be said to be meant."""
+
+    least: float
+    most: float
+
+    def fault(self, name: str, value: float) -> str:
+        """Why a value is not plausible, with its unit; "" where it is."""
+        if self.least <= value <= self.most:
+            return ""
+        side, limit = ("below", self.least) if value < self.least else ("above", self.most)
+        return (
+            f"{name} is {value:g} ({in_words(name, value)}), {side} what is plausible, "
+            f"{limit:g} ({in_words(name, limit)})"
+        )
+
+
 Name = Annotated[str, Field(max_length=200), AfterValidator(_name)]
 # Strict, because YAML's yes and no would count as 1 and 0.
 Number = Annotated[float, Field(strict=True)]
+Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Angle = Annotated[Number, Field(gt=-math.pi / 2, lt=math.pi / 2)]
-Vector = tuple[Number, Number, Number]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
 Direction = Annotated[Vector, AfterValidator(_direction)]
 Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_quaternion)]
+FileName = Annotated[str, Field(max_length=4096), AfterValidator(_file_name)]
+PlainMapping = Annotated[dict[str, Any], AfterValidator(_plain)]
+"""Whatever else is said: anything that YAML and JSON can hold."""
 
 
 class Quantities(Strict):
@@ -69,6 +124,10 @@ class Quantities(Strict):
         schema = handler.resolve_ref_schema(handler(core_schema))
         properties = schema.get("properties", {})
         for name in list(properties):
+            for usual in _usual(cls, name):
+                told = f"Plausible: {usual.least:.6g} to {usual.most:.6g}."
+                said = properties[name].get("description", "")
+                properties[name]["description"] = f"{said} {told}".strip()
             for other, factor in other_names(name).items():
                 properties[other] = _scaled(properties[name], 1 / factor)
                 properties[other]["description"] = f"Instead of {name}."
@@ -77,6 +136,28 @@ class Quantities(Strict):
                     either = [{"required": [name]}, {"required": [other]}]
                     schema.setdefault("allOf", []).append({"oneOf": either})
         return schema
+
+
+def implausible(model: Quantities, within: str = "") -> list[str]:
+    """A line for each quantity of a model, and of those in it, that is beyond its `Usual`.
+
+    within: the model's own name and a dot, where it is in another.
+    """
+    lines = []
+    for name in type(model).model_fields:
+        value = getattr(model, name)
+        if isinstance(value, Quantities):
+            lines += implausible(value, f"{within}{name}.")
+        elif value is not None:
+            numbers = value if isinstance(value, tuple) else (value,)
+            faults = (u.fault(within + name, n) for u in _usual(type(model), name) for n in numbers)
+            lines += [fault for fault in faults if fault][:1]
+    return lines
+
+
+def _usual(model: type[Quantities], name: str) -> list[Usual]:
+    field = model.model_fields.get(name)
+    return [] if field is None else [item for item in field.metadata if isinstance(item, Usual)]
 
 
 def _scaled(schema: dict[str, Any], factor: float) -> dict[str, Any]:
