@@ -20,9 +20,10 @@ COLOURS = np.arange(12, dtype=np.uint8).reshape(4, 3)
 
 def pcd(data: bytes, kind: str, viewpoint: str = "", height: int = 1, count: int = 4) -> bytes:
     place = f"VIEWPOINT {viewpoint}\n" if viewpoint else ""
+    size = f"WIDTH {count // height}\nHEIGHT {height}\n{place}POINTS {count}\n"
     return (
         "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb intensity\nSIZE 4 4 4 4 4\nTYPE F F F U F\n"
-        f"COUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT {height}\n{place}POINTS {count}\nDATA {kind}\n"
+        f"COUNT 1 1 1 1 1\n{size}DATA {kind}\n"
     ).encode() + data
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import pytest
 import torch
@@ -10,7 +11,7 @@ from safetensors.torch import load_file, save_file
 
 from nrdf.errors import ModelError, OutputError
 from nrdf.field import PRESETS, build_field
-from nrdf.field.weights import load_weights, read_metadata, save_weights
+from nrdf.field.weights import FORMAT, _digest, load_weights, read_metadata, save_weights
 from tiny_field import TinyField
 
 
@@ -82,6 +83,73 @@ def test_altered_metadata_is_refused(saved):
     path.write_bytes(path.read_bytes().replace(b"0.5", b"0.1"))
     with pytest.raises(ModelError, match="altered or damaged"):
         read_metadata(path)
+
+
+def forged(path, tensors=None, **metadata):
+    """A weight file of a tiny field with other tensors and metadata, and a right checksum."""
+    field = build_field("tiny", {"width": 12})
+    tensors = {**field.state_dict(), **(tensors or {})}
+    known = {"format": FORMAT, "preset": "tiny", "category": "ball", "field": {"width": 12}}
+    text = {k: json.dumps(v) for k, v in known.items()}
+    text |= {k: v if isinstance(v, str) else json.dumps(v) for k, v in metadata.items()}
+    text["sha256"] = _digest(tensors, text)
+    save_file(tensors, path, metadata=text)
+    return path
+
+
+def test_a_forged_file_that_says_the_truth_is_read(tmp_path):
+    assert load_weights(forged(tmp_path / "x"))[0].preset == "tiny"
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_values_that_are_not_finite_are_refused_on_loading(tmp_path, value):
+    path = forged(tmp_path / "x", {"norm.running_var": torch.full((12,), value)})
+    for read in (load_weights, read_metadata):
+        with pytest.raises(ModelError, match=r"'norm\.running_var' has values that are NaN or inf"):
+            read(path)
+
+
+@pytest.mark.parametrize(
+    ("metadata", "message"),
+    [
+        ({"category": "{"}, "does not say what it is"),
+        ({"category": "9" * 5000}, "does not say what it is"),
+        ({"category": "[" * 100_000}, "does not say what it is"),
+        ({"category": 5}, "category: must be text, not 5"),
+        ({"preset": ["tiny"]}, "preset: must be text"),
+        ({"preset": '"tinny"'}, "no preset 'tinny'"),
+        ({"field": []}, "field: must be a mapping"),
+        ({"field": "null"}, "field: must be a mapping"),
+        ({"field": {"width": "wide"}}, "cannot be built with 'width'"),
+        ({"field": {"width": -3}}, "width must be 0 to"),
+        ({"field": {"width": 0}}, "do not fit preset 'tiny'"),
+        ({"field": {"width": 13}}, r"'decoder\.0\.bias' is \(12,\), not \(13,\)"),
+        ({"field": {"width": 900_000}}, r"is \(12,\), not \(900000,\)"),
+        ({"field": {"width": 12, "encoder_points": 0}}, "encoder_points must be at least 1"),
+        ({"field": {"width": 12, "dropout": 7.0}}, "do not fit preset 'tiny'"),
+        ({"scores": {"own": "good"}}, "scores.own: must be a number"),
+        ({"shapes": 3}, "shapes: must be a mapping"),
+    ],
+)
+def test_bad_metadata_with_a_right_checksum_is_refused(tmp_path, metadata, message):
+    with pytest.raises(ModelError, match=message):
+        load_weights(forged(tmp_path / "x", **metadata))
+
+
+@pytest.mark.parametrize("kind", [torch.bfloat16, torch.complex64, torch.float8_e4m3fn])
+def test_types_that_we_never_write_are_refused(tmp_path, kind):
+    with pytest.raises(ModelError, match=r"altered or damaged|no weight file"):
+        save_file({"x": torch.zeros(3).to(kind)}, tmp_path / "x", {"format": json.dumps(FORMAT)})
+        load_weights(tmp_path / "x")
+
+
+def test_a_pipe_and_a_file_beyond_all_sizes_are_refused(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ModelError, match="it is a pipe"):
+        load_weights(tmp_path / "pipe")
+    monkeypatch.setattr("nrdf.field.weights.LARGEST", 10)
+    with pytest.raises(ModelError, match="at most"):
+        load_weights(forged(tmp_path / "x"))
 
 
 def test_files_of_something_else_are_refused(tmp_path):

@@ -68,6 +68,25 @@ def test_damaged_index_is_refused(stocked):
         list_models(stocked)
 
 
+@pytest.mark.parametrize(
+    ("change", "value"),
+    [("file", 5), ("file", "../chair.safetensors"), ("sha256", None), ("scores", []), ("x", 1)],
+)
+def test_an_index_with_other_things_in_it_is_refused(stocked, change, value):
+    content = json.loads((stocked / "index.json").read_text())
+    content["models"]["chair"][change] = value
+    (stocked / "index.json").write_text(json.dumps(content))
+    with pytest.raises(ModelError, match=r"index\.json is damaged"):
+        load_field("chair", stocked)
+
+
+@pytest.mark.parametrize("content", ["[]", '{"models": 3}', '{"models": {"a": 3}}', "[" * 100_000])
+def test_an_index_of_another_shape_is_refused(stocked, content):
+    (stocked / "index.json").write_text(content)
+    with pytest.raises(ModelError, match=r"index\.json is damaged"):
+        list_models(stocked)
+
+
 def test_paths_load_too(tmp_path, untrained):
     assert load_field(untrained, tmp_path)[1]["category"] == "chair"
     run = tmp_path / "run"

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from nrdf import ply
-from nrdf.errors import CloudError
+from nrdf.errors import CloudError, DataError
+from nrdf.files import open_file
 from nrdf.formats import reader_of
-from nrdf.mesh import Mesh
+from nrdf.mesh import Mesh, check_size
 from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
@@ -88,19 +89,20 @@ def read_cloud(
     an MCAP or SQLite file) the first cloud of `topic` is read, which may be left out where only one
     topic has clouds.
 
-    Raises CloudError if the file is missing, unreadable, truncated, in no known format, or empty,
+    Raises CloudError if the file is missing, no regular file (a pipe, say), unreadable, truncated,
+    in no known format, or empty, has coordinates above 1e12, holds more than its header claims,
     or if 1 % or more of its points have NaN or infinite coordinates; fewer are dropped, with a
     warning that counts them. In PCD files and bags such points mean that a pixel measured nothing:
     any number of them is dropped.
     """
     path = Path(path)
+    start = b""
+    if not (path / "metadata.yaml").is_file():  # else the folder of a bag
+        with open_file(path, CloudError) as file:
+            start = file.read(512)
+        if not start:
+            raise CloudError(f"{path}: the file is empty")
     try:
-        start = b""
-        if not (path / "metadata.yaml").is_file():  # else the folder of a bag
-            with open(path, "rb") as file:
-                start = file.read(512)
-            if not start:
-                raise CloudError(f"{path}: the file is empty")
         raw = reader_of(path, start, topic)(path, mesh_samples)
     except OSError as error:
         raise CloudError(f"cannot read {path}: {error.strerror or error}") from error
@@ -127,9 +129,14 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
         level = logging.INFO if gaps else logging.WARNING
         logger.log(level, "%s: dropped %d points with NaN or infinite coordinates", path, missing)
         cloud = cloud.select(finite)
+    try:
+        check_size(cloud.points)
+    except DataError as error:
+        raise CloudError(f"{path}: {error}") from error
     if cloud.normals is None:
         return cloud
-    length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
     if not (np.isfinite(length) & (length > 1e-6)).all():
         logger.warning("%s: some normals are zero or not finite; all are left out", path)
         return replace(cloud, normals=None)

@@ -38,14 +38,11 @@ def open_file(path: str | Path, error: type[NrdfError]) -> BinaryIO:
     where it may not be read."""
     require_file(path, error)  # before opening: opening alone makes some devices act
     try:
-        # Without waiting: another process may have put a pipe in its place by now.
-        flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        handle = os.open(path, flags)
-        file = os.fdopen(handle, "rb")
+        file = open(path, "rb", opener=_at_once)  # noqa: SIM115 (the caller closes it)
     except OSError as problem:
         raise _unreadable(path, problem, error) from None
     try:
-        _size(path, os.fstat(handle), error)
+        _size(path, os.fstat(file.fileno()), error)
     except NrdfError:
         file.close()
         raise
@@ -65,6 +62,11 @@ def read_file(path: str | Path, error: type[NrdfError], most: int) -> bytes:
     if len(content) > most:
         raise error(f"{path} has more than {most / 1e6:g} MB, too much for what it should be")
     return content
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Opens without waiting: another process may have put a pipe in the file's place by now."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _size(path: str | Path, found: os.stat_result, error: type[NrdfError]) -> int:

@@ -9,17 +9,24 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from nrdf.errors import DataError
+from nrdf.errors import DataError, NrdfError
+from nrdf.files import open_file, read_file
 from nrdf.geometry import visibility
 
-MOST_FACES = 5_000_000
+MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
+MOST_FACES = 2_500_000
+FARTHEST = 1e12
+"""The largest coordinate that is read, in any unit; beyond it are damaged files only, and numbers
+that cannot be squared."""
 SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
 _HASH = np.uint64(0x9E3779B97F4A7C15)  # odd, with evenly spread bits
+_MOST_BESIDE = 250_000_000  # bytes of a file that a mesh names
 _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
 
 
@@ -48,47 +55,77 @@ class Skin:
 def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (v, 3) float64, in the file's unit, and faces (f, 3) int64 of the mesh `path`.
 
-    Any format that trimesh reads; a scene's meshes are put together. Equal vertices are merged,
-    faces without area and repeated faces left out. Raises DataError if the file cannot be read,
-    or holds no surface, vertices that are not finite, or more than five million faces.
+    PLY, OBJ, OFF, STL, GLB, glTF, 3MF or DAE; a scene's meshes are put together. Equal vertices are
+    merged, faces without area and repeated faces left out. Raises DataError if the file cannot be
+    read, claims more than it holds, or holds no surface, vertices that are not finite or beyond
+    all sizes, or too many faces.
     """
     import trimesh
 
+    from nrdf.formats.mesh_claims import check_claims
+
+    path = Path(path)
     logging.getLogger("trimesh").setLevel(logging.ERROR)
+    if path.suffix.lower() not in MESH_ENDINGS:
+        raise DataError(f"{path}: no mesh that can be read; known: {', '.join(MESH_ENDINGS)}")
+    with open_file(path, DataError) as file:
+        try:
+            check_claims(path, file)
+            file.seek(0)
+            if file.read(3) != b"\xef\xbb\xbf":  # a byte-order mark hides the first line
+                file.seek(0)
+            beside: Any = _Beside(path)
+            mesh: Any = trimesh.load(
+                file,
+                file_type=path.suffix.lower()[1:],
+                resolver=beside,
+                force="mesh",
+                process=False,
+                skip_materials=True,  # and the pictures that they name
+            )
+        except NrdfError as error:
+            why = str(error).removeprefix(f"{path}: ")
+            raise DataError(f"{path}: unreadable as a mesh: {why}") from error
+        except Exception as error:  # trimesh raises whatever its parsers raise
+            why = str(error) or type(error).__name__
+            raise DataError(f"{path}: unreadable as a mesh, truncated or damaged: {why}") from error
+    faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64)
+    vertices = np.asarray(getattr(mesh, "vertices", np.empty((0, 3))), dtype=np.float64)
+    del mesh
     try:
-        mesh = trimesh.load(path, force="mesh", process=False)
-    except FileNotFoundError as error:
-        raise DataError(f"no mesh file {path}") from error
-    except Exception as error:  # trimesh raises whatever its parsers raise
-        raise DataError(f"{path}: unreadable as a mesh, truncated or damaged ({error})") from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise DataError(f"{path}: empty: no faces")
-    if len(mesh.faces) > MOST_FACES:
-        raise DataError(
-            f"{path}: {len(mesh.faces)} faces; at most {MOST_FACES} are used: simplify the mesh"
-        )
-    faces = np.asarray(mesh.faces, dtype=np.int64)
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    try:
-        return clean(*check_mesh(vertices, faces))
+        vertices, faces = check_mesh(vertices, faces)
+        check_size(vertices)
+        return clean(vertices, faces)
     except DataError as error:
-        raise DataError(f"{path}: damaged: {error}") from error
+        raise DataError(f"{path}: {error}") from error
+
+
+def check_size(points: np.ndarray) -> None:
+    """Raise DataError for points (n, 3), finite, with coordinates beyond those of any object."""
+    if (largest := np.abs(points).max(initial=0.0)) > FARTHEST:
+        raise DataError(
+            f"has coordinates of {largest:.3g}; at most {FARTHEST:g} are read: it is damaged, or "
+            "no object"
+        )
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The mesh as float64 (v, 3) and int64 (f, 3), in memory as native code wants them.
 
-    Raises DataError where there is no face, a face names a vertex that does not exist, or a vertex
-    that is used is not finite. Vertices that no face uses are moved onto one that is used.
+    Raises DataError where there is no face, or too many, a face names a vertex that does not exist,
+    or a vertex that is used is not finite. Vertices that no face uses are moved onto one that is
+    used.
     """
     vertices = np.array(vertices, dtype=np.float64, order="C")
     faces = np.ascontiguousarray(faces, dtype=np.int64)
+    if not len(faces):
+        raise DataError("the mesh has no faces")
     if vertices.ndim != 2 or faces.ndim != 2 or (vertices.shape[1], faces.shape[1]) != (3, 3):
         raise DataError(
             f"vertices {vertices.shape} and faces {faces.shape} must be (v, 3) and (f, 3)"
         )
-    if not len(faces):
-        raise DataError("the mesh has no faces")
+    if len(faces) > MOST_FACES:
+        raise DataError(f"{len(faces)} faces; at most {MOST_FACES} are used: simplify the mesh")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise DataError("a face names a vertex that does not exist")
     used = np.zeros(len(vertices), bool)
@@ -97,6 +134,21 @@ def check_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
         raise DataError("the mesh has vertices that are NaN or infinite")
     vertices[~used] = vertices[faces[0, 0]]
     return vertices, faces
+
+
+class _Beside:
+    """The files that a mesh names, for trimesh: those of its own folder, and regular ones only."""
+
+    def __init__(self, path: Path) -> None:
+        self._folder = path.parent.resolve()
+
+    def get(self, name: str) -> bytes:
+        place = (self._folder / name).resolve()
+        if self._folder not in place.parents:
+            raise DataError(f"it names the file {name}, which is outside its folder")
+        return read_file(place, DataError, _MOST_BESIDE)
+
+    __getitem__ = get
 
 
 def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

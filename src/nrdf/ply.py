@@ -7,16 +7,19 @@ memory is set aside for them.
 from __future__ import annotations
 
 import os
+import re
 import secrets
-from collections.abc import Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from nrdf.errors import CloudError, OutputError
+from nrdf.files import open_file
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -25,8 +28,10 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_COUNT = re.compile("[0-9]{1,100}")
 _LONGEST_HEADER = 1 << 16
 MOST_POINTS = 200_000_000
+_PART = 1 << 25  # bytes of binary rows, or values of text, that are held at a time
 
 
 @dataclass
@@ -69,11 +74,15 @@ class Header:
 def read_header(path: Path) -> Header:
     """Header of the PLY file `path`.
 
-    Raises CloudError if it is not PLY, malformed, or claims more rows than the file can hold.
+    Raises CloudError if it is not PLY, malformed, or claims more rows than the file can hold, or
+    fewer than it holds.
     """
-    with open(path, "rb") as file:
+    with open_file(path, CloudError) as file:
         header = _parse_header(path, file)
         left = os.fstat(file.fileno()).st_size - header.start
+        claimed = sum(element.count for element in header.elements)
+        if not header.byte_order and count_rows(file, claimed) > claimed:
+            raise _too_many(path, f"{claimed} rows")
     for element in header.elements:
         if element.count > MOST_POINTS:
             raise CloudError(
@@ -88,7 +97,30 @@ def read_header(path: Path) -> Header:
                 f"{path}: truncated: the header claims {element.count} rows of '{element.name}', "
                 "more than the file holds; copy or export it again"
             )
+    filled = [element for element in header.elements if element.count]
+    lists = any(p.length_kind for element in filled for p in element.properties)
+    if header.byte_order and filled and not lists and left >= filled[-1].smallest_row:
+        raise _too_many(path, f"{filled[-1].count} rows of '{filled[-1].name}'")
     return header
+
+
+def text_rows(file: BinaryIO) -> Iterator[bytes]:
+    """The lines of a text file that follow and are neither blank nor a comment."""
+    for line in file:
+        if not line.isspace() and not line.lstrip().startswith(b"#"):
+            yield line
+
+
+def count_rows(file: BinaryIO, most: int) -> int:
+    """How many `text_rows` follow; counts no further than one beyond `most`."""
+    return sum(1 for _ in islice(text_rows(file), most + 1))
+
+
+def _too_many(path: Path, what: str) -> CloudError:
+    return CloudError(
+        f"{path}: the header claims {what}, but the file holds more: which of the two is right "
+        "cannot be told; correct the header or export the file again"
+    )
 
 
 def _parse_header(path: Path, file: BinaryIO) -> Header:
@@ -116,7 +148,7 @@ def _parse_header(path: Path, file: BinaryIO) -> Header:
             byte_order = _FORMATS.get(words[1])
             if byte_order is None:
                 raise bad(f"format '{words[1]}'; known: {', '.join(_FORMATS)}")
-        elif words[0] == "element" and len(words) == 3 and words[2].isdigit():
+        elif words[0] == "element" and len(words) == 3 and _COUNT.fullmatch(words[2]):
             elements.append(Element(words[1], int(words[2])))
         elif words[0] == "property" and elements and len(words) in (3, 5):
             kinds = words[2:4] if words[1] == "list" else words[1:2]
@@ -141,8 +173,11 @@ def _parse_header(path: Path, file: BinaryIO) -> Header:
     return Header(byte_order, elements, comments, file.tell())
 
 
-def read_scalars(path: Path, header: Header, name: str = "vertex") -> dict[str, np.ndarray]:
-    """Every scalar property (n,) of the element `name`, by name; lists are skipped.
+def read_scalars(
+    path: Path, header: Header, name: str = "vertex", wanted: Container[str] | None = None
+) -> dict[str, np.ndarray]:
+    """Every scalar property (n,) of the element `name`, or those `wanted`, by name; lists are
+    skipped.
 
     Raises CloudError if the element is missing, or if its rows are damaged or truncated.
     """
@@ -153,16 +188,12 @@ def read_scalars(path: Path, header: Header, name: str = "vertex") -> dict[str, 
         before.append(element)
     else:
         raise CloudError(f"{path}: no element '{name}' in this PLY file, so no points")
-    with open(path, "rb") as file:
+    with open_file(path, CloudError) as file:
         file.seek(header.start)
         try:
-            if header.byte_order:
-                for other in before:
-                    _read_binary(file, other, header.byte_order)
-                return _read_binary(file, element, header.byte_order)
             for other in before:
-                _read_ascii(file, other)
-            return _read_ascii(file, element)
+                _read_rows(file, other, header.byte_order, ())
+            return _read_rows(file, element, header.byte_order, wanted)
         except (ValueError, EOFError, MemoryError) as error:
             raise CloudError(
                 f"{path}: truncated or damaged: cannot read {element.count} rows of '{name}' "
@@ -170,27 +201,112 @@ def read_scalars(path: Path, header: Header, name: str = "vertex") -> dict[str, 
             ) from error
 
 
-def _read_binary(file: BinaryIO, element: Element, order: str) -> dict[str, np.ndarray]:
-    if all(p.length_kind is None for p in element.properties):
+def _read_rows(
+    file: BinaryIO, element: Element, order: str, wanted: Container[str] | None
+) -> dict[str, np.ndarray]:
+    """The `wanted` scalar properties (n,) of the element whose rows come next in the file."""
+    names = [p.name for p in element.properties]
+    lists = any(p.length_kind for p in element.properties)
+    kept = [
+        p for p in element.properties
+        if p.length_kind is None and (wanted is None or p.name in wanted)
+    ]  # fmt: skip
+    if order and not lists:
         row = np.dtype([(p.name, order + p.kind) for p in element.properties])
-        table = np.fromfile(file, dtype=row, count=element.count)
-        if len(table) < element.count:
-            raise EOFError(f"only {len(table)} complete rows")
-        return {p.name: table[p.name] for p in element.properties}
-    scalars = [p for p in element.properties if p.length_kind is None]
-    values = {p.name: np.empty(element.count, order + p.kind) for p in scalars}
+        return gather(binary_parts(file, row, element.count), element.count, [p.name for p in kept])
+    if not lists:
+        values: dict[str, np.ndarray] = {p.name: np.empty(element.count) for p in kept}
+        for start, part in text_parts(file, element.count, len(names)):
+            for p in kept:
+                values[p.name][start : start + len(part)] = part[:, names.index(p.name)]
+        return values
+    values = {p.name: np.empty(element.count, order + p.kind if order else "f8") for p in kept}
+    read_row = _read_binary_row if order else _read_text_row
     for i in range(element.count):
-        for p in element.properties:
-            value = _take(file, order + (p.length_kind or p.kind))
-            if p.length_kind is None:
-                values[p.name][i] = value
-                continue
-            length = int(value)
-            if length < 0:
-                raise ValueError(f"a list of length {length}")
-            file.seek(length * np.dtype(p.kind).itemsize, os.SEEK_CUR)
+        for name, value in read_row(file, element, order).items():
+            if name in values:
+                values[name][i] = value
     if file.tell() > os.fstat(file.fileno()).st_size:
         raise EOFError("the last list runs past the end of the file")
+    return values
+
+
+def binary_parts(file: BinaryIO, row: np.dtype, count: int) -> Iterator[np.ndarray]:
+    """The next `count` packed rows of a file, some at a time.
+
+    Raises EOFError where the file ends before.
+    """
+    step = max(1, _PART // row.itemsize)
+    for start in range(0, count, step):
+        part = np.fromfile(file, dtype=row, count=min(step, count - start))
+        if len(part) < min(step, count - start):
+            raise EOFError(f"truncated: only {start + len(part)} complete rows of {count}")
+        yield part
+
+
+def gather(parts: Iterator[np.ndarray], count: int, names: list[str]) -> dict[str, np.ndarray]:
+    """The fields `names`, each (count,), of rows that come some at a time."""
+    columns: dict[str, np.ndarray] = {}
+    start = 0
+    for part in parts:
+        for name in names:
+            if name not in columns:
+                columns[name] = np.empty(count, part.dtype[name])
+            columns[name][start : start + len(part)] = part[name]
+        start += len(part)
+    return columns or {name: np.empty(0) for name in names}
+
+
+def text_parts(file: BinaryIO, count: int, width: int) -> Iterator[tuple[int, np.ndarray]]:
+    """The next `count` rows of `width` numbers in a text file, some at a time: the number of the
+    first row, and the rows (m, width) float64.
+
+    Raises ValueError for rows that are too few, too long or too short, or no numbers.
+    """
+    place = file.tell()
+    if count_rows(file, count) < count:
+        raise ValueError(f"the file ends before row {count}")
+    file.seek(place)
+    step = max(1, _PART // (8 * width))
+    for start in range(0, count, step):
+        rows = min(step, count - start)
+        part = np.loadtxt(islice(text_rows(file), rows), ndmin=2, comments=None)
+        if part.shape != (rows, width):
+            raise ValueError(
+                f"found {start + part.shape[0]} rows of {part.shape[1]} values, "
+                f"expected {count} of {width}"
+            )
+        yield start, part
+
+
+def _read_binary_row(file: BinaryIO, element: Element, order: str) -> dict[str, float]:
+    values = {}
+    for p in element.properties:
+        value = _take(file, order + (p.length_kind or p.kind))
+        if p.length_kind is None:
+            values[p.name] = value
+            continue
+        length = int(value)
+        if length < 0:
+            raise ValueError(f"a list of length {length}")
+        file.seek(length * np.dtype(p.kind).itemsize, os.SEEK_CUR)
+    return values
+
+
+def _read_text_row(file: BinaryIO, element: Element, _: str) -> dict[str, float]:
+    words = file.readline().split()
+    values, position = {}, 0
+    for p in element.properties:
+        if position >= len(words):
+            raise EOFError(f"a row has {len(words)} values, too few")
+        if p.length_kind is None:
+            values[p.name] = float(words[position])
+        else:
+            length = int(words[position])
+            if length < 0 or position + length >= len(words):
+                raise ValueError(f"a row has a list of length {length}")
+            position += length
+        position += 1
     return values
 
 
@@ -199,36 +315,6 @@ def _take(file: BinaryIO, kind: str) -> float:
     if len(raw) < np.dtype(kind).itemsize:
         raise EOFError("the file ends within a row")
     return float(np.frombuffer(raw, kind)[0])
-
-
-def _read_ascii(file: BinaryIO, element: Element) -> dict[str, np.ndarray]:
-    properties = element.properties
-    if element.count == 0:
-        return {p.name: np.empty(0) for p in properties if p.length_kind is None}
-    if all(p.length_kind is None for p in properties):
-        table = np.loadtxt(file, max_rows=element.count, ndmin=2, comments=None)
-        if table.shape != (element.count, len(properties)):
-            raise ValueError(
-                f"found {table.shape[0]} rows of {table.shape[1]} values, "
-                f"expected {element.count} of {len(properties)}"
-            )
-        return {p.name: table[:, i] for i, p in enumerate(properties)}
-    values = {p.name: np.empty(element.count) for p in properties if p.length_kind is None}
-    for i in range(element.count):
-        words = file.readline().split()
-        position = 0
-        for p in properties:
-            if position >= len(words):
-                raise EOFError(f"row {i} has {len(words)} values, too few")
-            if p.length_kind is None:
-                values[p.name][i] = float(words[position])
-            else:
-                length = int(words[position])
-                if length < 0 or position + length >= len(words):
-                    raise ValueError(f"row {i} has a list of length {length}")
-                position += length
-            position += 1
-    return values
 
 
 def write_rows(path: Path, columns: Mapping[str, np.ndarray], comments: list[str]) -> None:

@@ -14,6 +14,13 @@ from typing import Any
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres of each unit that a cloud may have."""
 
+_SPELLINGS = {
+    "m": ("metre", "metres", "meter", "meters"),
+    "cm": ("centimetre", "centimetres", "centimeter", "centimeters"),
+    "mm": ("millimetre", "millimetres", "millimeter", "millimeters"),
+    "in": ("inch", "inches", '"'),
+}
+
 USUAL_SIZES = {"chair": (0.4, 1.6), "car": (2.5, 8.0), "plane": (4.0, 85.0), "table": (0.4, 4.0)}
 """Longest sides (m) that objects of a category usually have."""
 
@@ -35,6 +42,12 @@ _SHOWN = (
     ("_s", 1.0, " s"),
     ("_n", 1.0, " N"),
 )
+
+
+def unit_named(word: str) -> str | None:
+    """The unit of `METRES` that a file means by "mm", "Millimeters" or the like, or None."""
+    word = word.strip().lower()
+    return next((unit for unit in METRES if word == unit or word in _SPELLINGS[unit]), None)
 
 
 def guess_unit(longest_side: float, category: str) -> str | None:

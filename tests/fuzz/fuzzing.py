@@ -21,8 +21,8 @@ from hypothesis import HealthCheck, settings
 
 from nrdf.errors import NrdfError
 
-SECONDS = 20.0
-"""What one input may take; a reader that is still at it hangs."""
+SECONDS = 60.0
+"""What one input may take, on a machine that does much else; a reader that is still at it hangs."""
 MEMORY = 1_000_000_000
 """Bytes that one input may take beyond what the process has."""
 THOROUGH = settings.get_profile("default").max_examples * 10

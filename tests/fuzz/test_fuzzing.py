@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from fuzzing import altered, damaged, message_of, outcome_of, tries
-from hypothesis import find, given, settings
+from hypothesis import Phase, find, given, settings
 
 from nrdf.errors import CloudError
 
@@ -59,6 +59,7 @@ def test_memory_that_was_taken_for_a_moment_fails():
     assert outcome_of(lambda: len(np.ones(1_000_000)), memory=100_000_000) == 1_000_000
 
 
+SEARCH = settings(max_examples=5000, derandomize=True, phases=[Phase.generate])
 CONTENT = b"ply\nelement vertex 4\nend_header\n1 2 3\n4 5 6\n7 8 9\n1 1 2\n"
 
 
@@ -73,7 +74,7 @@ CONTENT = b"ply\nelement vertex 4\nend_header\n1 2 3\n4 5 6\n7 8 9\n1 1 2\n"
     ],
 )
 def test_damage_of_every_kind_comes_up(sign):
-    find(damaged(CONTENT), sign, settings=settings(max_examples=5000, derandomize=True))
+    find(damaged(CONTENT), sign, settings=SEARCH)
 
 
 TREE = {"name": "a", "steps": [{"speed": 0.1}, {"speed": 0.2}]}
@@ -96,7 +97,7 @@ def test_alterations_of_every_kind_come_up(sign):
         except (KeyError, TypeError, IndexError):
             return False
 
-    find(altered(TREE), shows, settings=settings(max_examples=5000, derandomize=True))
+    find(altered(TREE), shows, settings=SEARCH)
 
 
 @tries(20)

@@ -10,14 +10,25 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 from torch import Tensor, nn
+
+_LARGEST_SIZE = 1_000_000
 
 
 class FieldConfig(BaseModel):
-    """Base of a preset's sizes; unknown keys are refused."""
+    """Base of a preset's sizes; unknown keys are refused, and what is no size."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="after")
+    def _are_sizes(self) -> FieldConfig:
+        for name, value in self:
+            if isinstance(value, (int, float)) and not 0 <= value <= _LARGEST_SIZE:
+                raise ValueError(f"{name} must be 0 to {_LARGEST_SIZE}, not {value}")
+        if getattr(self, "encoder_points", 1) < 1:
+            raise ValueError("encoder_points must be at least 1")
+        return self
 
 
 class Inverse(NamedTuple):

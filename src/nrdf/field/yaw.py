@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from nrdf.errors import ModelError
 from nrdf.field.base import FieldConfig
-from nrdf.field.weights import load_tensors
+from nrdf.field.weights import fill, load_tensors
 from nrdf.field.zoo import YAW, ZOO, find_weights, list_models
 
 YAW_ZOO = ZOO / YAW
@@ -127,10 +127,8 @@ def load_yaw(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork, dict[st
             f"{path} holds a field of preset '{metadata.get('preset')}', not yaws; "
             "`nrdf yaw` trains what is needed here"
         )
-    with torch.random.fork_rng(devices=[]):
-        network = YawNetwork(YawConfig(**metadata["field"]))
-    network.load_state_dict(tensors)
-    return network.eval(), metadata
+    network = fill(path, YAW, tensors, lambda: YawNetwork(YawConfig(**metadata["field"])))
+    return network, metadata
 
 
 def find_yaw(category: str) -> YawNetwork | None:

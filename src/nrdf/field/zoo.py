@@ -14,15 +14,19 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, TypeAdapter
+
 from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
 from nrdf.field.weights import load_weights, read_metadata
+from nrdf.files import read_file
 from nrdf.ply import write_atomically
 
 log = logging.getLogger(__name__)
 
 ZOO = Path(__file__).resolve().parents[1] / "zoo"
 INDEX = "index.json"
+_LARGEST_INDEX = 10_000_000  # bytes
 LARGEST = 8_000_000
 """Bytes that a weight file in the zoo may have."""
 YAW = "yaw"
@@ -35,6 +39,8 @@ WEIGHTS = "weights.safetensors"
 class ZooEntry:
     """One model of the zoo. scores: name to value, lower is better; shapes: source to count and
     licences of the training shapes."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
     name: str
     file: str
@@ -49,19 +55,26 @@ class ZooEntry:
     note: str = ""
 
 
+_ENTRY = TypeAdapter(ZooEntry)
+
+
 def list_models(zoo: Path = ZOO) -> list[ZooEntry]:
     """The models of the zoo by name; none if there is no index.
 
     Raises ModelError if the index is damaged.
     """
     path = zoo / INDEX
-    if not path.is_file():
+    if not path.exists():
         return []
     try:
-        models = json.loads(path.read_text(encoding="utf-8"))["models"]
-        return [ZooEntry(name=name, **models[name]) for name in sorted(models)]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        models = json.loads(read_file(path, ModelError, _LARGEST_INDEX))["models"]
+        entries = [_ENTRY.validate_python({**models[n], "name": n}) for n in sorted(models)]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise ModelError(f"{path} is damaged ({error}); install nrdf again") from None
+    for entry in entries:
+        if Path(entry.file).name != entry.file:
+            raise ModelError(f"{path} is damaged ('{entry.file}' is no file of it)")
+    return entries
 
 
 def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:

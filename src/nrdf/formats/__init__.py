@@ -6,6 +6,7 @@ CloudError if the file is truncated, damaged or not what it says it is.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -14,9 +15,11 @@ import numpy as np
 
 from nrdf import ply
 from nrdf.errors import CloudError
-from nrdf.formats import meshes, pcd, tables
-from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
-from nrdf.units import METRES
+from nrdf.formats import arrays, meshes, pcd, tables
+from nrdf.formats.raw import USED, RawCloud, colours_of, intensity_of, stack
+from nrdf.units import METRES, unit_named
+
+logger = logging.getLogger(__name__)
 
 KNOWN_FORMATS = "PLY, PCD, XYZ/TXT/CSV/ASC/PTS, NPY, NPZ, OFF, OBJ, STL, GLB, ROS 2 bags"
 Reader = Callable[[Path, int], RawCloud]
@@ -36,9 +39,9 @@ def reader_of(path: Path, start: bytes, topic: str | None = None) -> Reader:
     if start.startswith((b"ply\n", b"ply\r")):
         return _read_ply
     if start.startswith(b"\x93NUMPY"):
-        return tables.read_npy
+        return arrays.read_npy
     if start.startswith(b"PK\x03\x04") and ending == ".npz":
-        return tables.read_npz
+        return arrays.read_npz
     if ending == ".pcd" or start.startswith(b"# .PCD"):
         return pcd.read_pcd
     if ending == ".off" or start.split(b"\n", 1)[0].strip() in (b"OFF", b"COFF", b"NOFF"):
@@ -60,19 +63,23 @@ def _read_ply(path: Path, mesh_samples: int) -> RawCloud:
     if header.count("face") and mesh_samples:
         cloud = meshes.read_mesh(path, mesh_samples)
     else:
-        columns = ply.read_scalars(path, header)
+        columns = ply.read_scalars(path, header, wanted=USED)
         points = stack(columns, "xyz")
         if points is None:
+            has = [p.name for e in header.elements if e.name == "vertex" for p in e.properties]
             raise CloudError(
-                f"{path}: its vertices have the properties {', '.join(columns) or '(none)'}; "
-                "x, y and z are needed"
+                f"{path}: its vertices have the properties {', '.join(has) or '(none)'}; "
+                "x, y and z are needed as plain numbers"
             )
         cloud = RawCloud(points, stack(columns, ("nx", "ny", "nz")))
         cloud.colours, cloud.intensity = colours_of(columns), intensity_of(columns)
     for comment in header.comments:
         word, _, rest = comment.partition(" ")
-        if word == "unit" and rest.strip() in METRES:
-            cloud.unit = rest.strip()
+        if word == "unit" and len(rest.split()) == 1:
+            cloud.unit = unit_named(rest)
+            if cloud.unit is None:
+                known = ", ".join(METRES)
+                logger.warning("%s: its unit '%s' is not known (%s)", path, rest.strip(), known)
         elif word == "frame" and rest:
             cloud.frame = rest
         elif word == "sensor":

@@ -10,10 +10,12 @@ import numpy as np
 
 from nrdf import ply
 from nrdf.errors import CloudError, unknown_name
+from nrdf.files import read_file, require_file
 from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
 
 logger = logging.getLogger(__name__)
 
+_LONGEST_DESCRIPTION = 4_000_000  # bytes
 MESSAGE = "sensor_msgs/msg/PointCloud2"
 _KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _SENSOR_WORDS = ("optical", "camera", "lidar", "laser", "depth", "sensor", "scanner")
@@ -39,6 +41,7 @@ def read_bag(path: Path, _: int, topic: str | None = None) -> RawCloud:
             f"{path}: a bag's file without its metadata.yaml beside it; copy the bag's whole "
             f"folder, or make that file anew: ros2 bag reindex {folder}"
         )
+    _check_folder(folder)
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             clouds = [c for c in reader.connections if c.msgtype == MESSAGE]
@@ -53,8 +56,19 @@ def read_bag(path: Path, _: int, topic: str | None = None) -> RawCloud:
     except CloudError:
         raise
     except Exception as error:  # rosbags lets through what its storage and parsers raise
-        raise CloudError(f"{path}: truncated or damaged ROS 2 bag ({error})") from error
+        why = str(error) or type(error).__name__
+        raise CloudError(f"{path}: truncated or damaged ROS 2 bag ({why})") from error
     raise CloudError(f"{path}: no message of {chosen} holds a point")
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise CloudError if reading the bag would wait for a pipe, or its description explodes."""
+    description = read_file(folder / "metadata.yaml", CloudError, _LONGEST_DESCRIPTION)
+    if b"<<" in description:  # merged mappings, which no bag has, can grow beyond all bounds
+        raise CloudError(f"{folder / 'metadata.yaml'}: damaged: no bag's description merges keys")
+    for file in folder.iterdir():
+        if not file.is_dir():
+            require_file(file, CloudError)
 
 
 def _choose(path: Path, topics: list[str], topic: str | None) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -9,9 +11,13 @@ import numpy as np
 
 from nrdf import ply
 from nrdf.errors import CloudError
-from nrdf.formats.raw import RawCloud, colours_of, intensity_of, stack
+from nrdf.files import open_file
+from nrdf.formats.raw import MOST_UNPACKED, USED, RawCloud, colours_of, intensity_of, stack
 
 _LONGEST_HEADER = 1 << 16
+_LONGEST_ROW = 1 << 16  # bytes
+_LZF_BEST = 90  # bytes that each packed one can give at most: three for 264
+_SIZES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
 
 
 def read_pcd(path: Path, _: int) -> RawCloud:
@@ -20,12 +26,13 @@ def read_pcd(path: Path, _: int) -> RawCloud:
     A viewpoint at the origin counts as known only in a grid (HEIGHT above 1), where the camera's
     own frame is the usual one: the origin is also what writers put where they know nothing.
     """
-    with open(path, "rb") as file:
+    with open_file(path, CloudError) as file:
         said = _read_header(path, file)
         try:
             columns = _read_columns(file, said)
-        except (KeyError, ValueError, IndexError, TypeError, EOFError) as error:
-            raise CloudError(f"{path}: cannot read this PCD file: {error}") from error
+        except (KeyError, ValueError, IndexError, EOFError) as error:
+            why = f"no {error} in its header" if isinstance(error, KeyError) else error
+            raise CloudError(f"{path}: cannot read this PCD file: {why}") from error
     points = stack(columns, "xyz")
     if points is None:
         raise CloudError(
@@ -61,54 +68,135 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
     return said
 
 
+@dataclass(frozen=True)
+class _Field:
+    """A field: the type of its values, how many each point has, and where in a point it starts,
+    in bytes and in values."""
+
+    name: str
+    kind: np.dtype
+    repeat: int
+    offset: int
+    place: int
+
+
 def _read_columns(file: BinaryIO, said: dict[str, list[str]]) -> dict[str, np.ndarray]:
-    """The first value of every field (n,), by name."""
-    fields = said["FIELDS"]
-    count = int(said["POINTS"][0])
-    repeats = [int(c) for c in said.get("COUNT", ["1"] * len(fields))]
-    kinds = ["<" + t.lower() + s for t, s in zip(said["TYPE"], said["SIZE"], strict=True)]
-    if not 0 <= count <= ply.MOST_POINTS or len(fields) != len(kinds):
-        raise ValueError(f"{count} points of {len(fields)} fields")
-    layout = [(f"{i}", k, (c,)) for i, (k, c) in enumerate(zip(kinds, repeats, strict=True))]
-    row = np.dtype(layout)
+    """The first value of every field (n,) that a cloud has a use for, by name."""
+    count, fields = _count(said), _fields(said)
+    row = fields[-1].offset + fields[-1].repeat * fields[-1].kind.itemsize
+    width = fields[-1].place + fields[-1].repeat
+    used = [field for field in fields if field.name in USED]
+    left = os.fstat(file.fileno()).st_size - file.tell()
     data = said["DATA"][0]
     if data == "ascii":
-        table = np.loadtxt(file, max_rows=count, ndmin=2, comments=None)
-        _check_length(len(table), count)
-        first = np.concatenate([[0], np.cumsum(repeats)[:-1]])
-        return {
-            name: table[:, i].astype(kind)
-            for name, kind, i in zip(fields, kinds, first, strict=True)
-        }
+        return _read_text(file, used, count, width, left)
     if data == "binary":
-        raw = np.frombuffer(file.read(count * row.itemsize), np.uint8)
-        _check_length(len(raw) // row.itemsize, count)
-        rows = raw.view(row)
-        return {name: rows[f"{i}"][:, 0] for i, name in enumerate(fields)}
+        _check_length(left // row, count)
+        names = [field.name for field in used]
+        layout = {
+            "names": names,
+            "formats": [field.kind for field in used],
+            "offsets": [field.offset for field in used],
+            "itemsize": row,
+        }
+        parts = ply.binary_parts(file, np.dtype(layout), count)  # type: ignore[call-overload]
+        return ply.gather(parts, count, names)
     if data == "binary_compressed":
-        sizes = file.read(8)
-        if len(sizes) < 8:
-            raise ValueError("truncated: nothing follows DATA binary_compressed")
-        packed, size = (int(v) for v in np.frombuffer(sizes, "<u4"))
-        if size != count * row.itemsize:
-            raise ValueError(f"{size} bytes do not make {count} points of {row.itemsize} bytes")
-        raw = np.frombuffer(decompress_lzf(file.read(packed), size), np.uint8)
-        columns, start = {}, 0
-        # One field after another, not one point after another.
-        for name, (_, kind, (repeat,)) in zip(fields, layout, strict=True):
-            length = count * repeat * np.dtype(kind).itemsize
-            columns[name] = raw[start : start + length].view(kind)[::repeat]
-            start += length
-        return columns
+        return _read_compressed(file, used, count, row, left)
     raise ValueError(f"DATA {data} is not known; known: ascii, binary, binary_compressed")
 
 
+def _count(said: dict[str, list[str]]) -> int:
+    count = int(said["POINTS"][0])
+    if not 0 <= count <= ply.MOST_POINTS:
+        raise ValueError(f"{count} points; at most {ply.MOST_POINTS} are read")
+    if "WIDTH" in said and "HEIGHT" in said:
+        width, height = int(said["WIDTH"][0]), int(said["HEIGHT"][0])
+        if width * height != count:
+            raise ValueError(f"WIDTH {width} times HEIGHT {height} is not POINTS {count}")
+    return count
+
+
+def _fields(said: dict[str, list[str]]) -> list[_Field]:
+    fields: list[_Field] = []
+    offset = place = 0
+    repeats = said.get("COUNT", ["1"] * len(said["FIELDS"]))
+    for name, letter, size, count in zip(
+        said["FIELDS"], said["TYPE"], said["SIZE"], repeats, strict=True
+    ):
+        if letter not in _SIZES or size not in _SIZES[letter]:
+            raise ValueError(f"field {name}: TYPE {letter} of SIZE {size} is not known")
+        kind, repeat = np.dtype(f"<{letter.lower()}{size}"), int(count)
+        if repeat < 1:
+            raise ValueError(f"field {name} has COUNT {repeat}")
+        fields.append(_Field(name, kind, repeat, offset, place))
+        offset, place = offset + repeat * kind.itemsize, place + repeat
+    if not fields or offset > _LONGEST_ROW:
+        raise ValueError(f"a point of {offset} bytes; 1 to {_LONGEST_ROW} are read")
+    names = [field.name for field in fields if field.name in USED]
+    if len(set(names)) != len(names):
+        raise ValueError("a field is named twice")
+    return fields
+
+
+def _read_text(
+    file: BinaryIO, used: list[_Field], count: int, width: int, left: int
+) -> dict[str, np.ndarray]:
+    start = file.tell()
+    _check_length(ply.count_rows(file, count), count)
+    file.seek(start)
+    if 2 * width * count > left + 1:  # each value takes a digit, and a space or a line end
+        raise ValueError(f"truncated: {count} points of {width} values are more than it holds")
+    columns = {field.name: np.empty(count, field.kind) for field in used}
+    for first, part in ply.text_parts(file, count, width):
+        for field in used:
+            values = part[:, field.place]
+            if field.kind.kind in "iu":
+                limits = np.iinfo(field.kind)
+                whole = (values == np.floor(values)) & (values <= limits.max)
+                if not (whole & (values >= limits.min)).all():
+                    raise ValueError(
+                        f"field {field.name} is declared as {field.kind.name}, but has other "
+                        "values: its TYPE or SIZE is wrong"
+                    )
+            with np.errstate(over="ignore"):
+                columns[field.name][first : first + len(part)] = values
+    return columns
+
+
+def _read_compressed(
+    file: BinaryIO, used: list[_Field], count: int, row: int, left: int
+) -> dict[str, np.ndarray]:
+    sizes = file.read(8)
+    if len(sizes) < 8:
+        raise ValueError("truncated: nothing follows DATA binary_compressed")
+    packed, size = (int(v) for v in np.frombuffer(sizes, "<u4"))
+    if size != count * row:
+        raise ValueError(f"{size} bytes do not make {count} points of {row} bytes")
+    if packed > left - 8 or size > _LZF_BEST * packed:
+        raise ValueError(f"truncated: no {size} bytes come of {min(packed, left - 8)}")
+    if size > MOST_UNPACKED:
+        raise ValueError(
+            f"it unpacks to {size / 1e9:.1f} GB; at most {MOST_UNPACKED / 1e9:g} GB are read: "
+            "write it with DATA binary"
+        )
+    raw = np.frombuffer(decompress_lzf(file.read(packed), size), np.uint8)
+    columns = {}
+    for field in used:  # one field after another, not one point after another
+        start = count * field.offset
+        end = start + count * field.repeat * field.kind.itemsize
+        columns[field.name] = raw[start:end].view(field.kind)[:: field.repeat].copy()
+    return columns
+
+
 def _check_length(found: int, count: int) -> None:
-    if found != count:
+    if found < count:
         raise ValueError(f"truncated: {found} of {count} points")
+    if found > count:
+        raise ValueError(f"it holds more than the {count} points that its header claims")
 
 
-def decompress_lzf(packed: bytes, size: int) -> bytes:
+def decompress_lzf(packed: bytes, size: int) -> bytearray:
     """Undo LZF compression (Lehmann's libLZF), as PCD files use it.
 
     A control byte below 32 is followed by that many bytes and one more, as they are; others carry
@@ -141,4 +229,4 @@ def decompress_lzf(packed: bytes, size: int) -> bytes:
         raise ValueError("truncated within its compressed data") from None
     if len(out) != size or place > end:
         raise ValueError(f"truncated: its compressed data give {len(out)} of {size} bytes")
-    return bytes(out)
+    return out

@@ -9,6 +9,15 @@ import numpy as np
 
 from nrdf.mesh import Mesh
 
+MOST_UNPACKED = 800_000_000
+"""Bytes that a compressed file may unpack to; a small file can claim any number."""
+_INTENSITY = ("intensity", "scalar_Intensity", "scalar_intensity", "reflectance", "i")
+USED = {
+    *("x", "y", "z", "nx", "ny", "nz", "normal_x", "normal_y", "normal_z"),
+    *("red", "green", "blue", "rgb", "rgba", *_INTENSITY),
+}
+"""Names of the columns that a cloud has a use for; no others need be held."""
+
 
 @dataclass
 class RawCloud:
@@ -36,7 +45,10 @@ def stack(columns: Mapping[str, np.ndarray], names: str | Sequence[str]) -> np.n
     """(n, 3) float64 of three columns, or None if one of them is missing."""
     if any(name not in columns for name in names):
         return None
-    return np.stack([columns[name].astype(np.float64) for name in names], axis=1)
+    whole = np.empty((len(columns[names[0]]), 3))
+    for axis, name in enumerate(names):
+        whole[:, axis] = columns[name]
+    return whole
 
 
 def colours_of(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
@@ -61,7 +73,7 @@ def colours_of(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 def intensity_of(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """(n,) float32 of whatever a file calls its points' intensity, or None."""
-    for name in ("intensity", "scalar_Intensity", "scalar_intensity", "reflectance", "i"):
+    for name in _INTENSITY:
         if name in columns:
             return columns[name].astype(np.float32)
     return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import zipfile
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,6 +10,8 @@ import numpy as np
 
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
+from nrdf.files import open_file
+from nrdf.formats.arrays import array_head, open_arrays
 from nrdf.picture import region_colours
 from nrdf.regions.match import Match
 from nrdf.regions.region import REGION_NAME
@@ -41,20 +43,37 @@ def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np
 
 def read_region_file(path: Path, unit: str | None = None) -> dict[str, np.ndarray]:
     """The regions of one file by name, as `read_regions` gives them: one, or those of an .npz."""
-    if path.suffix.lower() in (".npy", ".npz"):
-        try:
-            with open(path, "rb") as file:
-                loaded = np.load(file, allow_pickle=False)
-                if isinstance(loaded, np.ndarray):
-                    return {path.stem: loaded}
-                if "points" not in loaded:
-                    return {name: loaded[name] for name in loaded.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise RegionError(f"cannot read the region file {path}: {error}") from None
+    ending = path.suffix.lower()
+    if ending == ".npy":
+        return {path.stem: _read_array(path)}
+    if ending == ".npz":
+        with open_arrays(path, RegionError) as arrays:
+            if "points" not in arrays.names:
+                for name in arrays.names:
+                    _check(name, *arrays.head(name))
+                return {name: arrays.load(name) for name in arrays.names}
     cloud = read_cloud(path)
     if unit is not None and cloud.unit is not None:
         return {path.stem: cloud.points * (METRES[cloud.unit] / METRES[unit])}
     return {path.stem: cloud.points}
+
+
+def _read_array(path: Path) -> np.ndarray:
+    with open_file(path, RegionError) as file:
+        try:
+            _check(path.stem, *array_head(file, os.fstat(file.fileno()).st_size))
+            file.seek(0)
+            return np.lib.format.read_array(file, allow_pickle=False)
+        except ValueError as error:
+            raise RegionError(f"cannot read the region file {path}: {error}") from None
+
+
+def _check(name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
+    """Raise ValueError for what is no mask, no indices and no points."""
+    if kind.kind not in "biuf" or not (len(shape) == 1 or (len(shape) == 2 and shape[1] == 3)):
+        raise ValueError(
+            f"'{name}' is {shape} of {kind}; a region is a mask (n,), indices (m,) or points (m, 3)"
+        )
 
 
 def write_matches(folder: Path, target: PointCloud, matches: Mapping[str, Match]) -> None:
