@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal
 
+from nrdf.bounds import Count, CountFromZero
 from nrdf.commands.console import (
     errors,
     progress_bars,
@@ -21,11 +22,11 @@ def objects(
     group: tuple[str, ...] = ("chair+stool",),
     method: tuple[str, ...] = ("nrdf", "registration", "box-mask", "box-normals"),
     model: str = "chair",
-    views: tuple[int, ...] = (0,),
+    views: tuple[CountFromZero, ...] = (0,),
     normals: Literal["estimated", "given"] = "estimated",
-    points: int = 8192,
+    points: Count = 8192,
     device: str = "cpu",
-    workers: int | None = None,
+    workers: Count | None = None,
     overwrite: bool = False,
 ) -> None:
     """Parts of real objects: labelled on one mesh, found on every other.
