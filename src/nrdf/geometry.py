@@ -70,7 +70,7 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     kept: np.ndarray = np.arange(total)
     if total > 8 * count:
         # A first, fine grid makes the bisection independent of the number of points.
-        fine = _one_per_cell(points, lowest, side / min(6.0 * np.sqrt(count), 320.0))
+        fine = one_per_cell(points, lowest, side / min(6.0 * np.sqrt(count), 320.0))
         few = len(fine) < 2 * count
         kept = np.unique(rng.integers(0, total, 8 * count)) if few else fine
         if len(kept) > 64 * count:
@@ -81,7 +81,7 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     best = np.empty(0, dtype=np.int64)
     for _ in range(24):
         cell = float(np.sqrt(small * large))
-        chosen = _one_per_cell(candidates, lowest, cell)
+        chosen = one_per_cell(candidates, lowest, cell)
         if len(chosen) >= count:
             best, small = chosen, cell
             if len(chosen) <= 1.02 * count:
@@ -95,7 +95,7 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     return np.sort(rng.choice(chosen, count, replace=False))
 
 
-def _one_per_cell(points: np.ndarray, lowest: np.ndarray, cell: float) -> np.ndarray:
+def one_per_cell(points: np.ndarray, lowest: np.ndarray, cell: float) -> np.ndarray:
     """Index of one point in each occupied cell of a grid, in the order of the cells."""
     shape = ((points.max(axis=0) - lowest) / cell).astype(np.int64) + 1
     strides = np.array([shape[1] * shape[2], shape[2], 1], dtype=np.float64)

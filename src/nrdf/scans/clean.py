@@ -14,6 +14,7 @@ from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError, unknown_name
 from nrdf.geometry import bounding_box, thin
 from nrdf.scans.floor import Plane, find_floor
+from nrdf.scans.objects import separate_objects
 
 STEPS = ("thin", "duplicates", "floor", "outliers", "objects")
 MOST_POINTS = 200_000
@@ -24,7 +25,6 @@ _NEIGHBOURS = 12
 _SPARSER = 2.5  # times the neighbours' distances to theirs, from which a point is an outlier
 _GAP = 0.05  # of the longest side: parts nearer to each other than this are one object
 _FLATTER = 0.25  # heights count for less: parts above each other are one object
-_OTHER = 0.3  # share of the largest object's size from which another one is worth a warning
 
 
 @dataclass(frozen=True)
@@ -107,10 +107,15 @@ def clean_scan(
         keep("outliers", mask, "far from their neighbours")
         working = working[~bad]
     if "objects" not in skip:
-        label, sizes = _objects(scan.points[working], up)
-        mask = (label == 0)[_follow(scan.points[kept], scan.points[working])]
-        others = int((sizes[1:] > _OTHER * sizes[0]).sum())
-        note = f"not of the largest of {len(sizes)} objects" if len(sizes) > 1 else "one object"
+        apart = separate_objects(scan.points[working], up)
+        others = int(apart.max())
+        own = np.flatnonzero(apart == 0)
+        label, number = _objects(scan.points[working[own]], up)
+        largest = np.zeros(len(working), bool)
+        largest[own[label == 0]] = True
+        mask = largest[_follow(scan.points[kept], scan.points[working])]
+        number += others
+        note = f"not of the largest of {number} objects" if number > 1 else "one object"
         keep("objects", mask, note)
     return Cleaned(scan.select(kept), kept, tuple(steps), floor, others)
 
@@ -141,8 +146,8 @@ def _outliers(points: np.ndarray) -> np.ndarray:
     return (own > _SPARSER * around) & (own > _SPARSER * np.median(own))
 
 
-def _objects(points: np.ndarray, up: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Which object each point belongs to (n,), the largest being 0, and their sizes in cells.
+def _objects(points: np.ndarray, up: np.ndarray | None) -> tuple[np.ndarray, int]:
+    """Which object, however small, each point belongs to (n,), the largest being 0; their number.
 
     Cells of a voxel grid belong together if they are nearer than a gap; with `up` (3,), heights
     count for less, and what lies over or under the largest object is part of it: a foot whose leg
@@ -159,10 +164,8 @@ def _objects(points: np.ndarray, up: np.ndarray | None) -> tuple[np.ndarray, np.
     if up is not None:
         label = _with_what_is_above(cells * (gap / 2), label, up, gap)
     sizes = np.bincount(label)
-    order = np.argsort(-sizes, kind="stable")
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return rank[label][cell.ravel()], sizes[order]
+    rank = np.argsort(np.argsort(-sizes, kind="stable"))
+    return rank[label][cell.ravel()], len(sizes)
 
 
 def _with_what_is_above(
