@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labelled_boxes import LABELS, furniture, write_object, write_objects
-from nrdf.benchmark.objects import list_objects, read_labels, read_object, read_objects
+from nrdf.benchmark.objects import Listed, list_objects, read_labels, read_object, read_objects
 from nrdf.errors import DataError
 
 
@@ -34,7 +34,7 @@ def test_objects_are_read_in_the_order_of_the_index_and_canonical(root):
     corners = found[0].vertices[found[0].faces]
     back, seat = (corners[found[0].label == name].mean(axis=(0, 1)) for name in ("back", "seat"))
     assert back[0] < seat[0] and back[1] > seat[1]
-    assert [item.name for item in read_objects(root, ["stool"])] == ["plain"]
+    assert [item.key for item in read_objects(root, ["stool"])] == ["stool/plain"]
 
 
 def test_fine_labels_are_taken_where_there_are_any(root):
@@ -137,7 +137,7 @@ def test_arrays_are_checked_before_room_is_made_for_them(root, name, member, mes
         if member is not None:
             archive.writestr(f"{name}.npy", member)
     with pytest.raises(DataError) as caught:
-        read_object(root, "chair", "low", read_labels(root))
+        read_object(root, Listed("chair", "low"), read_labels(root))
     assert message in str(caught.value) and str(path) in str(caught.value)
 
 

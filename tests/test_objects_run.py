@@ -84,6 +84,7 @@ def test_what_was_measured_is_not_measured_again(settings, root, tmp_path, monke
 
 def test_the_command_prints_a_table_and_writes_every_part(root, tmp_path, capsys):
     words = f"eval objects --data {root} --out {tmp_path} --method box-mask --points {POINTS} "
+    words += "--views 0 --jobs 0 "
     assert cli.run([*words.split(), "--workers", "1"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith("chair, stool: 6 ordered pairs, whole clouds")
@@ -99,9 +100,10 @@ def test_the_command_prints_a_table_and_writes_every_part(root, tmp_path, capsys
     "words, message",
     [
         ("--method nrdf-points", "no method for objects 'nrdf-points'; known: copy, box"),
-        ("--views 0 -1", "give numbers of cameras from 0"),
+        ("--views 0 -1", "--views -1 must be from 0 to 20"),
+        ("--jobs -1", "--jobs -1 must be 0 or more"),
         ("--views 1 1", "each once"),
-        ("--points 10", "10 points; give 256 to"),
+        ("--points 10", "--points 10 must be from 256 to"),
         ("--category sofa", "no category 'sofa'; known: chair, stool"),
         ("--model chiar", "chiar"),
     ],

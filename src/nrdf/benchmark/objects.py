@@ -1,7 +1,7 @@
 """Meshes whose faces carry the names of their parts, from any folder of the form below.
 
     labels.json               {"labels": {"seat": 1, "leg": 3, "mixed": 9}}
-    index.csv                 a line an object: category, name
+    index.csv                 a line an object: category, name (and perhaps forward_sure)
     <category>/<name>.npz     vertices (v, 3), faces (f, 3), face_label_fine or face_label (f,)
 
 Files are data of strangers: nothing in them is run, and what they claim is checked before room is
@@ -57,12 +57,26 @@ class Labels:
 
 
 @dataclass(frozen=True)
+class Listed:
+    """A line of `index.csv`. forward_sure: whether it is known which side is the front: "no" in the
+    column of that name says that it is not."""
+
+    category: str
+    name: str
+    forward_sure: bool = True
+
+    @property
+    def key(self) -> str:
+        """What tells an object from all others of its folder: "chair/agam"."""
+        return f"{self.category}/{self.name}"
+
+
+@dataclass(frozen=True)
 class LabelledMesh:
     """An object: vertices (v, 3), canonical; faces (f, 3), cleaned (`nrdf.mesh.clean`); label (f,)
     name of each face's part; checksum: SHA-256 of its file."""
 
-    category: str
-    name: str
+    listed: Listed
     vertices: np.ndarray
     faces: np.ndarray
     label: np.ndarray
@@ -70,8 +84,8 @@ class LabelledMesh:
 
     @property
     def key(self) -> str:
-        """What tells it from all others of its folder: "chair/agam"."""
-        return f"{self.category}/{self.name}"
+        """As `Listed.key`."""
+        return self.listed.key
 
 
 def read_labels(folder: Path) -> Labels:
@@ -100,8 +114,8 @@ def read_labels(folder: Path) -> Labels:
     return Labels(names, ignored, background)
 
 
-def list_objects(folder: Path) -> list[tuple[str, str]]:
-    """Category and name of each object, as `index.csv` lists them.
+def list_objects(folder: Path) -> list[Listed]:
+    """The objects that `index.csv` lists.
 
     Raises DataError if the file is missing, lacks a column, names an object twice or none, or a
     name is no plain word.
@@ -111,26 +125,29 @@ def list_objects(folder: Path) -> list[tuple[str, str]]:
         rows = list(csv.DictReader(_read_text(path).splitlines()))
     except csv.Error as error:
         raise DataError(f"{path}: no table with commas ({error})") from None
-    found = [(row.get("category") or "", row.get("name") or "") for row in rows]
-    for category, name in found:
+    found: dict[str, Listed] = {}
+    for row in rows:
+        category, name = row.get("category") or "", row.get("name") or ""
         if not (_WORD.fullmatch(category) and _WORD.fullmatch(name)):
             raise DataError(
                 f"{path}: '{category}', '{name}' is no category and name; the columns category and "
                 "name must hold plain words: letters, digits, '_', '-' and '.'"
             )
-        if found.count((category, name)) > 1:
+        item = Listed(category, name, (row.get("forward_sure") or "").strip() != "no")
+        if item.key in found:
             raise DataError(f"{path}: lists {category}, {name} twice")
+        found[item.key] = item
     if not found:
         raise DataError(f"{path}: lists no object; expected the columns category and name")
-    return found
+    return list(found.values())
 
 
-def read_object(folder: Path, category: str, name: str, labels: Labels) -> LabelledMesh:
+def read_object(folder: Path, listed: Listed, labels: Labels) -> LabelledMesh:
     """One object, canonical: its centre at 0, its longest side 1.
 
     Raises DataError if its file is missing, damaged, too large, or a face's label has no name.
     """
-    path = folder / category / f"{name}.npz"
+    path = folder / listed.category / f"{listed.name}.npz"
     try:
         with zipfile.ZipFile(path) as archive:
             fine = "face_label_fine.npy" in archive.namelist()
@@ -139,9 +156,7 @@ def read_object(folder: Path, category: str, name: str, labels: Labels) -> Label
             number = _read_array(archive, "face_label_fine" if fine else "face_label", 1, "iu")
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
     except FileNotFoundError:
-        raise DataError(
-            f"{folder}: {INDEX} lists {category}, {name}, but there is no {path}"
-        ) from None
+        raise DataError(f"{folder}: {INDEX} lists {listed.key}, but there is no {path}") from None
     except _UNREADABLE as error:
         raise DataError(f"{path}: damaged, or no labelled mesh ({error})") from None
     if len(number) != len(faces):
@@ -158,7 +173,7 @@ def read_object(folder: Path, category: str, name: str, labels: Labels) -> Label
         raise DataError(f"{path}: {error}") from None
     centre, scale = canonical_transform(vertices)
     names = np.array([labels.names[i] for i in number[kept].tolist()])
-    return LabelledMesh(category, name, (vertices - centre) / scale, faces, names, digest)
+    return LabelledMesh(listed, (vertices - centre) / scale, faces, names, digest)
 
 
 def read_objects(folder: Path, categories: Sequence[str] = ()) -> list[LabelledMesh]:
@@ -167,12 +182,12 @@ def read_objects(folder: Path, categories: Sequence[str] = ()) -> list[LabelledM
     Raises DataError as the readers above do, and for a category of which there is none.
     """
     labels, listed = read_labels(folder), list_objects(folder)
-    known = list(dict.fromkeys(category for category, _ in listed))
+    known = list(dict.fromkeys(item.category for item in listed))
     for category in categories:
         if category not in known:
             raise DataError(f"{folder}: {unknown_name('category', category, known)}")
-    chosen = [item for item in listed if item[0] in categories or not categories]
-    return [read_object(folder, *item, labels) for item in chosen]
+    chosen = [item for item in listed if item.category in categories or not categories]
+    return [read_object(folder, item, labels) for item in chosen]
 
 
 def _read_text(path: Path) -> str:

@@ -16,18 +16,18 @@ import numpy as np
 import nrdf
 from nrdf.benchmark.learned import FieldMatch
 from nrdf.benchmark.methods import METHODS, MethodSpec, build_method
-from nrdf.benchmark.objects import LabelledMesh, Labels, read_labels, read_object
+from nrdf.benchmark.objects import LabelledMesh, Labels, list_objects, read_labels, read_object
 from nrdf.benchmark.objects_pairs import THERE, Truth, part_iou, parts_of, state_of, truth_of
 from nrdf.benchmark.objects_sample import LabelledCloud, sample_object, scan_object
-from nrdf.benchmark.scans import UP, pose_error
+from nrdf.benchmark.scans import UP, is_doubted, pose_error
 from nrdf.cloud import PointCloud
 from nrdf.errors import ConfigError, unknown_name
 from nrdf.regions.embedded import Embedded
-from nrdf.regions.model import MINIMUM_POINTS, Model
+from nrdf.regions.match import Match
+from nrdf.regions.model import Model
 from nrdf.scans.judge import Judge
 from nrdf.scans.target import AlignedScan, bring_in
 
-MOST_VIEWS, MOST_POINTS = 20, 100_000
 WHOLE = 0
 """Views of the whole cloud, in its own frame; otherwise the number of cameras of a scan."""
 
@@ -45,10 +45,11 @@ class Settings:
 
 @dataclass(frozen=True)
 class Pose:
-    """How well the target's scan was aligned: degrees of the whole rotation, relative error of the
-    scale, whether the report doubted it, seconds."""
+    """How well the target's scan was aligned: degrees of the whole rotation, None where it is not
+    known which side of the target is the front; relative error of the scale; whether the report
+    doubted the pose; seconds."""
 
-    degrees: float
+    degrees: float | None
     scale: float
     doubted: bool
     seconds: float
@@ -78,7 +79,8 @@ class PartFigure:
 @dataclass(frozen=True)
 class PairFigure:
     """One method on one pair. views: `WHOLE`, or cameras of the target's scan; seconds: of finding
-    all parts, target and reference embedded before; pose: of a scan."""
+    all parts, target and reference embedded before; mixed: share of the reference's and of the
+    target's surface that counts nowhere; pose: of a scan."""
 
     method: str
     views: int
@@ -86,6 +88,7 @@ class PairFigure:
     target: str
     seconds: float
     parts: tuple[PartFigure, ...]
+    mixed: tuple[float, float]
     pose: Pose | None = None
 
 
@@ -113,6 +116,7 @@ class Finder:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.labels: Labels = read_labels(settings.folder)
+        self._listed = {item.key: item for item in list_objects(settings.folder)}
         self.mesh: Callable[[str], LabelledMesh] = lru_cache(None)(self._mesh)
         self.whole: Callable[[str], LabelledCloud] = lru_cache(None)(self._whole)
         self.truth: Callable[[str], Truth] = lru_cache(None)(self._truth)
@@ -130,46 +134,55 @@ class Finder:
         """The parts of an object that are large enough: name to indices of its whole cloud."""
         return parts_of(self.labels, self.whole(key))
 
-    def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> PairFigure:
-        """Find all parts of a reference on a target by one method, and score them."""
+    def find(
+        self, spec: MethodSpec, views: int, reference: str, target: str
+    ) -> tuple[dict[str, np.ndarray], dict[str, Match], float]:
+        """All parts of a reference on a target by one method: name to indices (k,) of the target's
+        cloud; what a method that tells absence says of each; seconds."""
         regions, seen = self.regions(reference), self.seen(target, views)
         match, cloud = build_method(spec), self.whole(reference).cloud
+        matches: dict[str, Match] = {}
         start = time.perf_counter()
         if isinstance(match, FieldMatch):
             matches = match.find(cloud, regions, seen.embedded)
-            found = {name: found.indices for name, found in matches.items()}
             if seen.aligned is not None:
-                found = {name: seen.aligned.cleaned.kept[i] for name, i in found.items()}
+                matches = {name: seen.aligned.in_scan(m) for name, m in matches.items()}
+            found = {name: m.indices for name, m in matches.items()}
         else:
-            matches = {}
             found = match(cloud, regions, seen.canonical)
             found = {name: seen.in_cloud(indices) for name, indices in found.items()}
-        seconds = time.perf_counter() - start
-        truth, parts = self.truth(target), []
+        return found, matches, time.perf_counter() - start
+
+    def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> PairFigure:
+        """Find all parts of a reference on a target by one method, and score them."""
+        found, matches, seconds = self.find(spec, views, reference, target)
+        seen, truth = self.seen(target, views), self.truth(target)
+        parts = []
         for name, indices in found.items():
             state = state_of(name, truth, seen.labelled)
             true = int((seen.labelled.label == name).sum())
             iou = None
             if state == THERE:
                 iou = part_iou(indices, name, self.labels, seen.labelled)
-            said = matches.get(name)
             figure = PartFigure(name, state, true, len(indices), iou)
-            if said is not None:
-                judged = said.presence
+            if name in matches:
+                judged = matches[name].presence
                 figure = replace(
                     figure,
                     reason=judged.reason,
-                    score=said.score,
+                    score=matches[name].score,
                     confidence=judged.confidence,
                     observed=judged.observed,
                     evidence=tuple(judged.evidence),
                 )
             parts.append(figure)
-        return PairFigure(spec.name, views, reference, target, seconds, tuple(parts), seen.pose)
+        mixed = self.truth(reference).mixed, truth.mixed
+        return PairFigure(
+            spec.name, views, reference, target, seconds, tuple(parts), mixed, seen.pose
+        )
 
     def _mesh(self, key: str) -> LabelledMesh:
-        category, name = key.split("/")
-        return read_object(self.settings.folder, category, name, self.labels)
+        return read_object(self.settings.folder, self._listed[key], self.labels)
 
     def _whole(self, key: str) -> LabelledCloud:
         return sample_object(self.mesh(key), self.settings.points, self.settings.normals)
@@ -187,12 +200,12 @@ class Finder:
         aligned = bring_in(self.judge, labelled.cloud, UP)
         seconds = time.perf_counter() - start
         degrees, scale = pose_error(aligned, labelled.pose)
-        embedded = aligned.embed()
+        sure, embedded = self._listed[key].forward_sure, aligned.embed()
         return Seen(
             labelled,
             embedded,
             PointCloud(embedded.points, embedded.normals),
-            Pose(degrees, scale, bool(aligned.doubts), seconds),
+            Pose(degrees if sure else None, scale, is_doubted(aligned), seconds),
             aligned,
         )
 
@@ -203,21 +216,15 @@ def finder(settings: Settings) -> Finder:
     return Finder(settings)
 
 
-def check_usable(methods: Sequence[str]) -> None:
-    """Raises ConfigError for a method that gives no sets of a target's points, or needs the
-    target's own coordinates."""
+def check_choice(methods: Sequence[str], views: Sequence[int]) -> None:
+    """Raises ConfigError for a method that gives no sets of a target's points, and for no views or
+    the same twice."""
     able = [n for n, e in METHODS.items() if not e.is_learned or n in ("nrdf", "nrdf-refined")]
     for name in methods:
         if name not in able:
             raise ConfigError(unknown_name("method for objects", name, able))
-
-
-def check_views(views: Sequence[int], points: int) -> None:
-    """Raises ConfigError for a number of cameras or points that makes no sense."""
-    if not views or min(views) < 0 or max(views) > MOST_VIEWS or len({*views}) < len(views):
+    if len({*views}) < max(len(views), 1):
         raise ConfigError(
-            f"views {', '.join(map(str, views)) or '(none)'}: give numbers of cameras from 0 (the "
-            f"whole cloud) to {MOST_VIEWS}, each once"
+            f"views {', '.join(map(str, views)) or '(none)'}: give numbers of cameras, each once; "
+            "0 is the whole cloud"
         )
-    if not MINIMUM_POINTS <= points <= MOST_POINTS:
-        raise ConfigError(f"{points} points; give {MINIMUM_POINTS} to {MOST_POINTS}")

@@ -46,11 +46,12 @@ def parts_of(labels: Labels, cloud: LabelledCloud) -> dict[str, np.ndarray]:
 @dataclass(frozen=True)
 class Truth:
     """What is true of an object, by its whole skin. share: of each part in it; parts: those large
-    enough; lacked: those that it certainly has not."""
+    enough; lacked: those that it certainly has not; mixed: share of what counts nowhere."""
 
     share: dict[str, float]
     parts: tuple[str, ...]
     lacked: tuple[str, ...]
+    mixed: float
 
 
 def truth_of(labels: Labels, mesh: LabelledMesh, cloud: LabelledCloud) -> Truth:
@@ -60,10 +61,11 @@ def truth_of(labels: Labels, mesh: LabelledMesh, cloud: LabelledCloud) -> Truth:
     it may be one.
     """
     share = {name: cloud.share(name) for name in labels.parts}
-    unsure = sum(cloud.share(name) for name in labels.ignored) >= LEAST_SHARE
+    mixed = sum(cloud.share(name) for name in labels.ignored)
     carried = {*np.unique(mesh.label).tolist()}
-    lacked = () if unsure else tuple(name for name in labels.parts if name not in carried)
-    return Truth(share, tuple(parts_of(labels, cloud)), lacked)
+    lacked = tuple(name for name in labels.parts if name not in carried)
+    parts = tuple(parts_of(labels, cloud))
+    return Truth(share, parts, lacked if mixed < LEAST_SHARE else (), mixed)
 
 
 def state_of(name: str, truth: Truth, seen: LabelledCloud) -> str:

@@ -1,4 +1,4 @@
-"""What was measured on labelled objects: as a table, as Markdown, CSV and JSON.
+"""What was measured on labelled objects, in rows: of the table, and of every pair and part.
 
 Definitions: docs/benchmark.md.
 """
@@ -8,16 +8,17 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
-from nrdf.benchmark.objects_match import PairFigure, PartFigure
-from nrdf.benchmark.objects_pairs import ABSENT, HIDDEN, THERE
+from nrdf.benchmark.objects_match import PairFigure, PartFigure, Pose
+from nrdf.benchmark.objects_pairs import ABSENT, HIDDEN, LEAST_SHARE, THERE
 from nrdf.process.transfer import MIN_CONFIDENCE
 
-RESAMPLES = 10_000
-RIVALS = ("nrdf", "registration")
+Pairs = Sequence[tuple[str, str]]
+_RESAMPLES = 10_000
+_RIGHT = 5.0  # degrees within which a pose is right
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Count:
     of: int
 
     def __str__(self) -> str:
-        return f"{self.number / self.of:.0%} ({self.number} of {self.of})" if self.of else ""
+        return f"{self.number / self.of:.0%} ({self.number}/{self.of})" if self.of else ""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class Row:
     """One method on a set of pairs, in whole clouds or in scans.
 
     iou: by part, mean over the pairs that both have it, with their number; mean: over all of
-    those. Of a method that tells absence, else None: told (present parts that were told absent or
+    those; plain: over those whose reference has no mixed pieces, so that all of each part was
+    taught. Of a method that tells absence, else None: told (present parts that were told absent or
     not observed), skipped (those, and present parts below `MIN_CONFIDENCE`), absent (absent parts
     that were skipped), hidden (parts not seen in the scan that were skipped).
     """
@@ -47,6 +49,7 @@ class Row:
     pairs: int
     iou: dict[str, tuple[float, int]]
     mean: float
+    plain: float
     seconds: float
     told: Count | None
     skipped: Count | None
@@ -54,21 +57,46 @@ class Row:
     hidden: Count | None
 
 
+@dataclass(frozen=True)
+class Difference:
+    """Mean part IoU of one method less another's, over the parts of a set's pairs; low, high: 95 %
+    interval, targets drawn anew with all of their pairs."""
+
+    set: str
+    views: int
+    one: str
+    other: str
+    mean: float
+    low: float
+    high: float
+    targets: int
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Alignments of a set's targets. right: within 5 degrees, of those whose front is known;
+    doubted: wrong ones that were doubted; scale: median relative error; seconds: median."""
+
+    set: str
+    views: int
+    right: Count
+    doubted: Count
+    scale: float
+    seconds: float
+
+
 def is_skipped(part: PartFigure) -> bool:
     """Whether a transfer would leave a part out: reported absent or not observed, or in doubt."""
     return bool(part.reason) or part.score is None or part.score < MIN_CONFIDENCE
 
 
-def rows_of(
-    figures: Sequence[PairFigure], sets: Mapping[str, Sequence[tuple[str, str]]]
-) -> list[Row]:
+def rows_of(figures: Sequence[PairFigure], sets: Mapping[str, Pairs]) -> list[Row]:
     """A row a set, view and method; empty ones are left out. sets: name to pairs of objects."""
     views = dict.fromkeys(figure.views for figure in figures)
     methods = dict.fromkeys(figure.method for figure in figures)
     found = []
     for name, pairs in sets.items():
-        chosen = {*pairs}
-        mine = [f for f in figures if (f.reference, f.target) in chosen]
+        mine = select(figures, pairs)
         for number in views:
             for method in methods:
                 of = [f for f in mine if (f.views, f.method) == (number, method)]
@@ -96,7 +124,8 @@ def _row(name: str, views: int, method: str, figures: Sequence[PairFigure]) -> R
         method=method,
         pairs=len(figures),
         iou={part: (float(np.mean(values)), len(values)) for part, values in by_part.items()},
-        mean=float(np.mean([part.iou or 0.0 for part in there])) if there else float("nan"),
+        mean=_mean(there),
+        plain=_mean([p for f in figures if f.mixed[0] < LEAST_SHARE for p in f.parts]),
         seconds=float(np.median([figure.seconds for figure in figures])),
         told=count(there, [bool(part.reason) for part in there]),
         skipped=count(there, [is_skipped(part) for part in there]),
@@ -105,19 +134,76 @@ def _row(name: str, views: int, method: str, figures: Sequence[PairFigure]) -> R
     )
 
 
+def _mean(parts: Sequence[PartFigure]) -> float:
+    values = [part.iou or 0.0 for part in parts if part.state == THERE]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def difference_of(
+    figures: Sequence[PairFigure], of: Row, one: str = "nrdf", other: str = "registration"
+) -> Difference | None:
+    """How much better one method is than another, where both were run: figures are a set's."""
+    iou: dict[str, dict[tuple[str, str, str], float]] = {one: {}, other: {}}
+    for figure in figures:
+        if figure.views == of.views and figure.method in iou:
+            for part in figure.parts:
+                if part.state == THERE:
+                    key = figure.reference, figure.target, part.part
+                    iou[figure.method][key] = part.iou or 0.0
+    targets = list(dict.fromkeys(target for _, target, _ in iou[one]))
+    if iou[one].keys() != iou[other].keys() or len(targets) < 2:
+        return None
+    number = {target: i for i, target in enumerate(targets)}
+    which = np.array([number[target] for _, target, _ in iou[one]])
+    better = np.array([iou[one][key] - iou[other][key] for key in iou[one]])
+    sums, counts = np.bincount(which, better), np.bincount(which)
+    drawn = np.random.default_rng(0).integers(0, len(targets), (_RESAMPLES, len(targets)))
+    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return Difference(
+        of.set, of.views, one, other, float(better.mean()), float(low), float(high), len(targets)
+    )
+
+
+def poses_of(figures: Sequence[PairFigure], of: Row) -> Poses | None:
+    """How well the targets of a set's scans were aligned; None of whole clouds."""
+    poses: dict[str, Pose] = {
+        figure.target: figure.pose
+        for figure in figures
+        if figure.views == of.views and figure.pose is not None
+    }
+    if not poses:
+        return None
+    known = [pose for pose in poses.values() if pose.degrees is not None]
+    wrong = [pose for pose in known if (pose.degrees or 0.0) >= _RIGHT]
+    return Poses(
+        of.set,
+        of.views,
+        Count(len(known) - len(wrong), len(known)),
+        Count(sum(pose.doubted for pose in wrong), len(wrong)),
+        float(np.median([pose.scale for pose in poses.values()])),
+        float(np.median([pose.seconds for pose in poses.values()])),
+    )
+
+
+def select(figures: Sequence[PairFigure], pairs: Pairs) -> list[PairFigure]:
+    """The figures of a set's pairs."""
+    chosen = {*pairs}
+    return [figure for figure in figures if (figure.reference, figure.target) in chosen]
+
+
 def headings(parts: Sequence[str]) -> list[str]:
     """The columns after the method's."""
-    return [
-        *parts, "mean IoU", "s/pair", "present told absent", "present skipped", "absent told",
-    ]  # fmt: skip
+    counts = ["present told absent", "present skipped", "absent told"]
+    return [*parts, "mean IoU", "plain", "s/pair", *counts]
 
 
 def cells(row: Row, parts: Sequence[str]) -> list[str]:
     """A row's texts for `headings`, empty where there is no value."""
     by_part = [f"{row.iou[part][0]:.3f}" if part in row.iou else "" for part in parts]
     counts = ["" if value is None else str(value) for value in (row.told, row.skipped, row.absent)]
-    mean = "" if np.isnan(row.mean) else f"{row.mean:.3f}"
-    return [*by_part, mean, f"{row.seconds:.2f}", *counts]
+    means = ["" if np.isnan(value) else f"{value:.3f}" for value in (row.mean, row.plain)]
+    return [*by_part, *means, f"{row.seconds:.2f}", *counts]
 
 
 def caption(row: Row) -> str:
@@ -141,10 +227,11 @@ def to_csv(figures: Sequence[PairFigure]) -> str:
     writer.writerow([
         "method", "views", "reference", "target", "part", "state", "iou", "true_points",
         "found_points", "reason", "skipped", "score", "confidence", "observed", "evidence",
-        "pose_error_deg", "seconds_a_pair",
+        "reference_mixed", "target_mixed", "pose_error_deg", "seconds_a_pair",
     ])  # fmt: skip
     for figure in figures:
-        pose = "" if figure.pose is None else f"{figure.pose.degrees:.3f}"
+        degrees = None if figure.pose is None else figure.pose.degrees
+        pose = "" if degrees is None else f"{degrees:.3f}"
         for part in figure.parts:
             own = [part.iou, part.score, part.confidence, part.observed]
             iou, *told = ("" if value is None else f"{value:.6g}" for value in own)
@@ -152,14 +239,8 @@ def to_csv(figures: Sequence[PairFigure]) -> str:
             writer.writerow([
                 figure.method, figure.views, figure.reference, figure.target, part.part,
                 part.state, iou, part.true, part.found, part.reason, skipped, *told,
-                " ".join(f"{value:.6g}" for value in part.evidence), pose,
+                " ".join(f"{value:.6g}" for value in part.evidence),
+                *(f"{share:.4f}" for share in figure.mixed), pose,
                 f"{figure.seconds:.4f}",
             ])  # fmt: skip
     return text.getvalue()
-
-
-def row_json(row: Row) -> dict[str, object]:
-    """A row as JSON."""
-    content = asdict(row)
-    content["iou"] = {name: {"mean": m, "pairs": n} for name, (m, n) in row.iou.items()}
-    return {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in content.items()}

@@ -152,11 +152,15 @@ def score_pose(judge: Judge, item: Item, kind: str) -> PoseFigure:
     found = bring_in(judge, cloud, UP)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
     yaw, scale = pose_error(found, pose)
-    alignment = found.alignment
-    doubted = alignment.is_ambiguous or alignment.best.symmetry == 0 or not found.fits
     return PoseFigure(
-        kind, item.source, item.name, yaw, scale, doubted, seconds, processor, len(cloud)
+        kind, item.source, item.name, yaw, scale, is_doubted(found), seconds, processor, len(cloud)
     )
+
+
+def is_doubted(found: AlignedScan) -> bool:
+    """Whether the pose is reported as ambiguous, rough or a poor fit."""
+    alignment = found.alignment
+    return alignment.is_ambiguous or alignment.best.symmetry == 0 or not found.fits
 
 
 def pose_error(found: AlignedScan, true: Similarity) -> tuple[float, float]:
