@@ -92,6 +92,8 @@ def test_the_command_prints_a_table_and_writes_every_part(root, tmp_path, capsys
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * (3 + 3) + 2 * 2
     assert {row["state"] for row in rows if row["part"] == "back"} == {"there", "absent"}
+    assert cli.run([*words.split(), "--workers", "1", "--pairs", "2"]) == 0
+    assert capsys.readouterr().out.startswith("chair, stool: 2 ordered pairs, whole clouds")
     mean = sum(float(row["iou"]) for row in rows if row["iou"]) / sum(1 for r in rows if r["iou"])
     assert f"{mean:.3f}" in shown
 

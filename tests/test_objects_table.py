@@ -9,8 +9,9 @@ import json
 import pytest
 
 from nrdf.benchmark.objects_figure import worst_pairs
-from nrdf.benchmark.objects_jobs import JobFigure, choose_jobs, jobs_lines
+from nrdf.benchmark.objects_jobs import JobFigure, jobs_lines
 from nrdf.benchmark.objects_match import PairFigure, PartFigure, Pose
+from nrdf.benchmark.objects_pairs import draw_pairs
 from nrdf.benchmark.objects_report import Report
 from nrdf.benchmark.objects_table import (
     Count,
@@ -134,15 +135,15 @@ def test_jobs_say_how_many_ended_and_what_failed():
     assert "GB" not in jobs_lines([job(memory=None)])[0] and jobs_lines([]) == []
 
 
-def test_the_same_jobs_are_drawn_every_time():
+def test_the_same_pairs_are_drawn_every_time():
     pairs = [(f"a/{i}", f"a/{i + 1}") for i in range(50)]
     assert (
-        choose_jobs(pairs, 5)
-        == choose_jobs(pairs, 5)
-        == sorted(choose_jobs(pairs, 5), key=pairs.index)
+        draw_pairs(pairs, 5)
+        == draw_pairs(pairs, 5)
+        == sorted(draw_pairs(pairs, 5), key=pairs.index)
     )
-    assert len({*choose_jobs(pairs, 5)}) == 5 and choose_jobs(pairs, 0) == []
-    assert choose_jobs(pairs, 100) == pairs
+    assert len({*draw_pairs(pairs, 5)}) == 5 and draw_pairs(pairs, 0) == []
+    assert draw_pairs(pairs, 100) == pairs
 
 
 def test_files_hold_the_tables_and_everything(tmp_path):

@@ -29,7 +29,6 @@ from nrdf.process.lesson import Lesson
 from nrdf.process.toolpath import read_job
 from nrdf.process.transfer import Teacher, Transferred
 
-JOBS = 30
 SIZE_M = 0.9
 """Longest side of the objects."""
 PROCESS = "sand"
@@ -54,12 +53,6 @@ class JobFigure:
     paths: int
     seconds: dict[str, float]
     memory_bytes: int | None
-
-
-def choose_jobs(pairs: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
-    """A random sample of the pairs, always the same of the same pairs, in their order."""
-    chosen = np.random.default_rng(0).permutation(len(pairs))[:count]
-    return [pairs[i] for i in sorted(chosen.tolist())]
 
 
 def run_job(settings: Settings, reference: str, target: str) -> JobFigure:

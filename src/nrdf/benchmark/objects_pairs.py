@@ -36,6 +36,12 @@ def group_categories(
     return {"+".join(members): tuple(members) for members in [*joined, *alone] if members}
 
 
+def draw_pairs(pairs: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
+    """A random sample of some pairs, always the same of the same pairs, in their order."""
+    chosen = np.random.default_rng(0).permutation(len(pairs))[:count]
+    return [pairs[i] for i in sorted(chosen.tolist())]
+
+
 def parts_of(labels: Labels, cloud: LabelledCloud) -> dict[str, np.ndarray]:
     """The parts that are large enough to be regions: name to indices (k,) of the cloud."""
     found = {name: np.flatnonzero(cloud.label == name) for name in labels.parts}

@@ -28,6 +28,7 @@ def objects(
     views: tuple[Annotated[int, Within(0, 20)], ...] = (0, 3, 1),
     normals: Literal["estimated", "given"] = "estimated",
     points: Annotated[int, Within(256, 100_000)] = 8192,
+    pairs: Count | None = None,
     jobs: CountFromZero = 30,
     device: str = "cpu",
     workers: Count | None = None,
@@ -55,6 +56,7 @@ def objects(
         views: Cameras of each simulated scan of a target; 0 is the whole cloud, in its own frame.
         normals: Of whole clouds: estimated, as of a scan, or the meshes' own.
         points: Of each whole cloud.
+        pairs: Only so many pairs of each category or group, drawn at random.
         jobs: Pairs, drawn at random, that go from a mesh file to robot programs; 0 for none.
         device: cpu, cuda, cuda:N or auto.
         workers: Processes; all cores unless given.
@@ -62,9 +64,8 @@ def objects(
     """
     from nrdf.benchmark.methods import METHODS, find_methods
     from nrdf.benchmark.objects import read_objects
-    from nrdf.benchmark.objects_jobs import choose_jobs
     from nrdf.benchmark.objects_match import Settings, check_choice, finder
-    from nrdf.benchmark.objects_pairs import group_categories
+    from nrdf.benchmark.objects_pairs import draw_pairs, group_categories
     from nrdf.benchmark.objects_report import Report
     from nrdf.benchmark.objects_run import JOBS, evaluate_jobs, evaluate_objects, pairs_of
     from nrdf.benchmark.objects_table import cells, headings, rows_of, tables
@@ -81,15 +82,17 @@ def objects(
         found = read_objects(data, category)
     groups = group_categories((item.listed.category for item in found), group)
     sets = {name: pairs_of(found, members) for name, members in groups.items()}
-    pairs = [pair for of in sets.values() for pair in of]
-    if not pairs:
+    if pairs is not None:
+        sets = {name: draw_pairs(of, pairs) for name, of in sets.items()}
+    all_pairs = [pair for of in sets.values() for pair in of]
+    if not all_pairs:
         raise DataError(f"{data}: no two objects of a category; nothing can be compared")
     settings = Settings(data.resolve(), path.resolve(), points, normals, device)
     kept = None if out is None else LineStore(out, overwrite)
     count = workers or os.cpu_count() or 1
-    chosen = choose_jobs(pairs, jobs)
+    chosen = draw_pairs(all_pairs, jobs)
     with progress_bars([*method, *[JOBS] * bool(chosen)]) as progress:
-        figures = evaluate_objects(settings, found, pairs, specs, views, count, kept, progress)
+        figures = evaluate_objects(settings, found, all_pairs, specs, views, count, kept, progress)
         done = evaluate_jobs(settings, found, chosen, count, kept, progress)
     for title, parts, rows in tables(rows_of(figures, sets)):
         shown = table(title, "", *headings(parts))
