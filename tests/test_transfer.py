@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import nrdf
 from nrdf.cloud import PointCloud, write_cloud
-from nrdf.errors import ModelError
+from nrdf.errors import CloudError, ModelError
 from nrdf.geometry import canonical_transform
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.transfer import Teacher, working
@@ -58,6 +58,18 @@ def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(mod
         positions = np.concatenate([segment.positions for segment in process_segments(step)])
         back = np.abs(turn.inv().apply(positions - OFFSET))
         assert (np.abs(back - SIZE / 2).min(axis=1) < 0.01).all()
+
+
+def test_a_target_may_be_a_file_or_an_array(model, tmp_path):
+    teacher = Teacher(lesson({"top": [SAND]}), model)
+    target = cloud(seed=1)
+    write_cloud(tmp_path / "new.ply", target)
+    from_file = teacher.transfer(tmp_path / "new.ply")
+    np.testing.assert_array_equal(from_file.target.points, target.points)
+    from_array = teacher.transfer(target.points, unit="m")
+    np.testing.assert_array_equal(from_array.target.points, target.points)
+    with pytest.raises(CloudError, match="the target cannot be dict.*accepted are"):
+        teacher.transfer({})
 
 
 def process_segments(step):

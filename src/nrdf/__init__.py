@@ -2,10 +2,10 @@
 
     model = nrdf.load_model("chair")
     taught = model.set_reference(nrdf.read_cloud("reference.ply"))
-    match = taught.retrieve(region, nrdf.read_cloud("target.ply"))
+    match = taught.retrieve(region, "target.ply")  # or an array (n, 3), a mesh, ...
 
     teacher = nrdf.teach("chair.yaml")  # process knowledge: regions, and what is done on them
-    job = teacher.transfer(nrdf.read_cloud("target.ply"))
+    job = teacher.transfer("target.ply")
 
 Everything is imported when it is first used, so `import nrdf` is cheap.
 """
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         RegionError,
         TrainingError,
     )
+    from nrdf.inputs import as_cloud
     from nrdf.process.knowledge import Knowledge
     from nrdf.process.transfer import Teacher, Transferred
     from nrdf.regions.match import Match
@@ -59,6 +60,7 @@ __all__ = [
     "Transferred",
     "__version__",
     "align",
+    "as_cloud",
     "load_model",
     "read_cloud",
     "teach",
@@ -69,6 +71,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
+    "as_cloud": "nrdf.inputs",
     "Match": "nrdf.regions.match",
     **dict.fromkeys(("Model", "Taught"), "nrdf.regions.model"),
     **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),

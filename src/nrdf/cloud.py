@@ -133,12 +133,18 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
         check_size(cloud.points)
     except DataError as error:
         raise CloudError(f"{path}: {error}") from error
+    return unit_normals(str(path), cloud)
+
+
+def unit_normals(name: str, cloud: PointCloud) -> PointCloud:
+    """The cloud with its normals brought to unit length, or without them, with a warning, where
+    some are missing. name: what it is, for the warning."""
     if cloud.normals is None:
         return cloud
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
     if not (np.isfinite(length) & (length > 1e-6)).all():
-        logger.warning("%s: some normals are zero or not finite; all are left out", path)
+        logger.warning("%s: some normals are zero or not finite; all are left out", name)
         return replace(cloud, normals=None)
     return replace(cloud, normals=cloud.normals / length)
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +25,7 @@ from scipy.spatial.transform import Rotation
 from nrdf.bounds import SHARE
 from nrdf.cloud import PointCloud, in_metres
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
+from nrdf.inputs import as_cloud
 from nrdf.output import output_folder
 from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
@@ -130,7 +132,7 @@ class Teacher:
 
     def transfer(
         self,
-        target: PointCloud | Embedded,
+        target: Any,
         unit: str | None = None,
         min_confidence: float = MIN_CONFIDENCE,
         marked: Mapping[str, ArrayLike] | None = None,
@@ -139,7 +141,8 @@ class Teacher:
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
-        target: in the category's orientation, or embedded in any pose, in metres. unit: of the
+        target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in the
+        category's orientation, or embedded in any pose, in metres. unit: of the
         target, where its file did not say. A region that is found nowhere, or with
         less mean confidence than `min_confidence`, is skipped; a process that does not fit its
         region there is left out with the reason. marked: regions that a person has marked on the
@@ -156,6 +159,7 @@ class Teacher:
         if isinstance(target, Embedded):
             embedded = self.taught.facing(self.lesson.regions, target)
         else:
+            target = as_cloud(target, "the target")
             category = self.lesson.knowledge.category
             known, doubted = unit_and_doubts(target, unit, category, "the target", "unit")
             if doubts is None:

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from nrdf.cloud import PointCloud, check_cloud
+from nrdf.cloud import check_cloud
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.base import Field
 from nrdf.geometry import canonical_transform, estimate_normals, thin
+from nrdf.inputs import as_cloud
 from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, oriented_features, snap, voters
 from nrdf.regions.embedded import Embedded, encoder_subset
 from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
@@ -60,11 +61,10 @@ class Model:
     def __repr__(self) -> str:
         return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"
 
-    def embed(
-        self, cloud: PointCloud, pose: Similarity | None = None, mirrored: bool = False
-    ) -> Embedded:
+    def embed(self, cloud: Any, pose: Similarity | None = None, mirrored: bool = False) -> Embedded:
         """Thin, orient, normalise and embed a cloud in the category's canonical frame.
 
+        cloud: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh.
         Any unit, centre and scale will do. Normals are used as they are, or estimated where there
         are none. Without `pose` (from canonical coordinates to the cloud's) the cloud is in the
         canonical orientation and its bounding box gives the rest. With `mirrored` the field sees
@@ -72,6 +72,7 @@ class Model:
         side is embedded more like a whole one. Raises CloudError for a cloud that is empty, flat,
         or has too few points.
         """
+        cloud = as_cloud(cloud)
         check_cloud(cloud, MINIMUM_POINTS)
         seconds: dict[str, float] = {}
         start = time.perf_counter()
@@ -98,12 +99,12 @@ class Model:
         seconds["embed"] = time.perf_counter() - start
         return Embedded(cloud, working, points, normals, pose, z, seconds)
 
-    def set_reference(self, reference: PointCloud) -> Taught:
+    def set_reference(self, reference: Any) -> Taught:
         """Embed a reference and describe its surface once, for any number of targets.
 
-        Raises CloudError as `embed` does.
+        reference: what `nrdf.as_cloud` takes. Raises CloudError as `embed` does.
         """
-        return Taught(self, self.embed(reference))
+        return Taught(self, self.embed(as_cloud(reference, "the reference")))
 
     def tensor(self, values: np.ndarray) -> torch.Tensor:
         """Values of any shape on the model's device, in single precision."""
@@ -125,7 +126,7 @@ class Taught:
     def retrieve(
         self,
         region: Any,
-        target: PointCloud | Embedded,
+        target: Any,
         method: str = "mask",
         refine: bool = False,
     ) -> Match:
@@ -135,13 +136,15 @@ class Taught:
     def retrieve_all(
         self,
         regions: Mapping[str, Any],
-        target: PointCloud | Embedded,
+        target: Any,
         method: str = "mask",
         refine: bool = False,
     ) -> dict[str, Match]:
         """Find regions on a target, which is embedded and mapped once for all of them.
 
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
+        target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or embedded.
+        Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
         method: "mask" maps the whole reference and lets each target point ask the mapped
         reference points nearest in position and normal; parts of the target that are far from all
         of them, by the error that the field expects, join a region only where they grow out of it
@@ -162,7 +165,7 @@ class Taught:
                 chosen[name] = region_indices(region, reference.cloud, lambda: reference.tree)
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
-        embedded = target if isinstance(target, Embedded) else self.model.embed(target)
+        embedded = target if isinstance(target, Embedded) else self._embed(target)
         surface = self.map_surface(embedded, refine)
         start = time.perf_counter()
         if method == "mask":
@@ -175,6 +178,9 @@ class Taught:
         matches = {n: self._judged(m, chosen[n], embedded, surface) for n, m in matches.items()}
         embedded.seconds["associate"] = time.perf_counter() - start
         return matches
+
+    def _embed(self, target: Any) -> Embedded:
+        return self.model.embed(as_cloud(target, "the target"))
 
     def map_surface(self, target: Embedded, refine: bool = False) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""

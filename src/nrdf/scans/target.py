@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from nrdf.cloud import PointCloud, in_metres
+from nrdf.inputs import as_cloud
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
@@ -106,15 +108,16 @@ class AlignedScan:
 
 def align(
     model: Model,
-    scan: PointCloud,
+    scan: Any,
     up: str = "auto",
     sensors: np.ndarray | None = None,
     unit: str | None = None,
     skip: Sequence[str] = (),
-    examples: Sequence[PointCloud] = (),
+    examples: Sequence[Any] = (),
 ) -> AlignedScan:
     """Clean a scan of one object in any pose, and align it with the model's category.
 
+    scan: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh; so examples.
     up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
     stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
     leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
@@ -124,7 +127,9 @@ def align(
     ModelError for a category without a family and no examples.
     """
     direction = None if up == "auto" else up_axis(up)
-    return bring_in(Judge(model, examples), scan, direction, sensors, unit, skip)
+    scan = as_cloud(scan, "the scan")
+    known = [as_cloud(example, "an example") for example in examples]
+    return bring_in(Judge(model, known), scan, direction, sensors, unit, skip)
 
 
 def bring_in(
