@@ -68,7 +68,7 @@ def test_a_target_may_be_a_file_or_an_array(model, tmp_path):
     np.testing.assert_array_equal(from_file.target.points, target.points)
     from_array = teacher.transfer(target.points, unit="m")
     np.testing.assert_array_equal(from_array.target.points, target.points)
-    with pytest.raises(CloudError, match="the target cannot be dict.*accepted are"):
+    with pytest.raises(CloudError, match=r"the target cannot be dict.*accepted are"):
         teacher.transfer({})
 
 
