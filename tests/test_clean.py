@@ -7,7 +7,7 @@ import pytest
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import CloudError
-from nrdf.scans.clean import MOST_POINTS, STEPS, clean_scan
+from nrdf.scans.clean import MOST_POINTS, STEPS, clean_scan, unthinned
 from nrdf.scans.floor import find_floor
 from nrdf.shapes.families import get_family
 from scenes import UP, pose, scan_of
@@ -116,6 +116,10 @@ def test_a_scan_of_many_points_is_thinned():
     assert 0.95 * MOST_POINTS < len(cleaned.kept) <= MOST_POINTS
     everything = clean_scan(PointCloud(many), UP, skip=["thin"])
     assert len(everything.kept) > 0.95 * len(many)
+    far = np.concatenate([many, [[9.0, 9.0, 9.0]]])  # an outlier is no point between others
+    whole = unthinned(PointCloud(many), cleaned), unthinned(PointCloud(far), cleaned)
+    assert len(whole[0]) == len(whole[1]) > 0.99 * len(many)
+    assert unthinned(PointCloud(many), everything) is everything.cloud
 
 
 def test_a_scan_of_nothing_but_floor_is_refused():

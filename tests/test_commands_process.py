@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
+import trimesh
 
 from nrdf import cli
 from nrdf.cloud import PointCloud, write_cloud
@@ -68,6 +70,35 @@ def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, c
     sand = next(path for path in read_job(taught / "job").paths if path.process == "sand")
     heights = [s.positions[:, 2] for s in sand.segments if s.kind == "process"]
     assert np.abs(np.concatenate(heights) - 0.6).max() < 0.01
+    # How it stands there goes along in the job, for whoever drives or draws it.
+    job = read_job(taught / "job")
+    np.testing.assert_allclose(job.up, [0, 0, 1], atol=0.02)
+    assert report["pose"]["up"] == pytest.approx(job.up.tolist())
+    corner = job.pose.to_scan(np.zeros((1, 3)))[0]
+    np.testing.assert_allclose(corner, [3.0, 0.0, 0.3], atol=0.02)
+    assert cli.run(["export", str(taught / "job"), "--format", "csv"]) == 0
+    head = (taught / "job" / "export" / "csv" / "nrdf_chair.csv").read_text()[:2000]
+    assert re.search(r"up for the object is -?0\.0\d+ -?0\.0\d+ (1\.0|0\.9)", head)
+
+
+def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
+    """In its unit, whatever was sampled of it; the limit is on that distance."""
+    box = trimesh.creation.box(1000 * SIZE)
+    box.export(taught / "box.stl")
+    words = ("--target", str(taught / "box.stl"), "--unit", "mm")
+    assert transfer(taught, untrained, *words, "--max-surface-distance-mm", "20") == 0
+    report = json.loads((taught / "job" / "report.json").read_text())
+    for path in report["paths"]:
+        assert path["measures"]["judged_by"] == "the mesh as given (12 triangles)"
+        assert path["measures"]["true_distance_95_m"] < 1e-3
+        assert 5e-3 < path["measures"]["step_worst_m"] < 0.03
+    page = (taught / "job" / "report.html").read_text()
+    assert "the mesh as given (12 triangles)" in page and "off the object" in page
+    tight = ("--max-surface-distance-mm", "0", "--max-step-mm", "1", "--overwrite")
+    assert transfer(taught, untrained, *words, *tight) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the worst distance from the mesh as given (12 triangles) is" in said
+    assert "the largest step between waypoints is" in said and "above 1 mm" in said
 
 
 def test_scan_options_need_up(taught, untrained, capsys):

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 import nrdf
 from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import CloudError, ModelError
 from nrdf.geometry import canonical_transform
+from nrdf.mesh import Mesh
+from nrdf.process.carry import carry
 from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.report import measure_warnings
 from nrdf.process.transfer import Teacher, working
 from nrdf.similarity import Similarity
 from taught_box import SAND, SIZE, cloud, faces, lesson
@@ -165,6 +172,56 @@ def test_regions_that_overlap_on_the_target_are_said(model):
     taught = type(taught)(taught.knowledge, reference, changed)
     result = Teacher(taught, model).transfer(cloud(seed=1))
     assert any("regions 'top' and 'right' overlap" in line for line in result.warnings)
+
+
+def test_paths_are_judged_by_the_mesh_that_was_given(model):
+    """Its points lie 5 mm outside of the box: planned on them, all is well."""
+    target = cloud(seed=1)
+    box = trimesh.creation.box(SIZE - 0.01)
+    mesh = Mesh(np.array(box.vertices), np.array(box.faces))
+    (step,) = Teacher(lesson({"top": [SAND]}), model).transfer(replace(target, mesh=mesh)).paths
+    assert step.measures.judged_by == "the mesh as given (12 triangles)"
+    assert step.measures.surface_distance_99_m < 1e-3
+    assert step.measures.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
+    assert step.measures.true_distance_worst_m >= step.measures.true_distance_95_m
+    (warning,) = (w for w in measure_warnings(step.process, step.measures) if "as given" in w)
+    assert re.match(r"1 % of the way on the surface is more than \d", warning)
+
+
+def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
+    """All points are 4 mm deeper on the top than those that a model works on."""
+    target = cloud(seed=1)
+    deeper = target.points - [0.0, 0.004, 0.0] * (target.normals[:, 1:2] > 0.5)
+    points = np.concatenate([deeper, deeper + 1e-4])
+    whole = PointCloud(points, np.concatenate([target.normals] * 2))
+    teacher = Teacher(lesson({"top": [SAND]}), model)
+    (step,) = teacher.transfer(target, whole=whole).paths
+    assert step.measures.judged_by == f"all {2 * len(target)} points as given"
+    assert step.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+    (alone,) = teacher.transfer(target).paths
+    assert alone.measures.judged_by == f"all {len(target)} points as given"
+    assert alone.measures.true_distance_95_m < 1e-3
+    (bare,) = teacher.transfer(target, whole=PointCloud(points)).paths  # without normals
+    assert bare.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+
+
+def test_a_carried_step_that_grew_is_said(model, monkeypatch):
+    def torn(way, lines, radius):
+        carried, lost = carry(way, lines, radius)
+        first = carried[0]
+        keep = np.r_[0:2, len(first.positions) - 1]
+        parts = {n: getattr(first, n)[keep] for n in ("positions", "quaternions_xyzw", "normals")}
+        return (replace(first, **parts), *carried[1:]), lost
+
+    teacher = Teacher(lesson({"front": [TAUGHT]}), model)
+    (step,) = teacher.transfer(cloud(seed=1)).paths
+    assert not any("a step of" in warning for warning in step.warnings)
+    monkeypatch.setattr("nrdf.process.transfer.carry", torn)
+    (step,) = teacher.transfer(cloud(seed=1)).paths
+    (warning,) = (w for w in step.warnings if "a step of" in w)
+    assert re.match(
+        r"a step of 5\d\d.* mm between .* the longest on the reference is 50 mm", warning
+    )
 
 
 def test_a_model_of_another_category_is_refused(model):

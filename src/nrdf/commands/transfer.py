@@ -15,6 +15,8 @@ from nrdf.commands.console import command_line, console, errors, provenance, sho
 _NAME_WIDTH = 12  # characters
 
 if TYPE_CHECKING:
+    from nrdf.cloud import PointCloud
+    from nrdf.regions.embedded import Embedded
     from nrdf.scans.target import AlignedScan
 
 
@@ -123,8 +125,8 @@ def transfer(
         marked = _marked(region, known)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
-            given, said = (cloud, known) if scan is None else (scan.embed_in_metres(known), None)
-            transferred = teacher.transfer(given, said, least, marked, doubts=doubts)
+            given, said, whole = (cloud, known, None) if scan is None else _of_scan(scan, known)
+            transferred = teacher.transfer(given, said, least, marked, doubts=doubts, whole=whole)
         origin = {
             "command": command_line(),
             "knowledge": str(knowledge),
@@ -144,6 +146,11 @@ def transfer(
         parts = (("limits not met", broken), ("doubtful, with --strict", doubted))
         lines = [line for title, of in parts if of for line in (f"{title}:", *_indented(of))]
         raise LimitError("\n".join(lines))
+
+
+def _of_scan(scan: AlignedScan, unit: str) -> tuple[Embedded, None, PointCloud]:
+    """A scan as `Teacher.transfer` takes it: embedded in metres, and all of its points."""
+    return scan.embed_in_metres(unit), None, scan.unthinned_in_metres(unit)
 
 
 def _nothing_planned(report: dict[str, Any], category: str, up: str | None) -> str:

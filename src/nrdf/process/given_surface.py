@@ -6,6 +6,7 @@ what is wrong with it would not be seen.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
@@ -42,6 +43,15 @@ def given_surface(cloud: PointCloud) -> GivenSurface:
         return MeshSurface(*usable)
     assert cloud.normals is not None  # the caller's to see to
     return PointSurface(cloud.points, cloud.normals)
+
+
+def with_normals_of(whole: PointCloud, cloud: PointCloud) -> PointCloud:
+    """A cloud with the normals of the nearest points of another one, where it has none of its
+    own."""
+    if whole.normals is not None or cloud.normals is None:
+        return whole
+    nearest = cKDTree(cloud.points).query(whole.points)[1]
+    return replace(whole, normals=cloud.normals[nearest])
 
 
 def _usable(mesh: Mesh) -> tuple[np.ndarray, np.ndarray] | None:

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry import estimate_normals, thin
 from nrdf.process.coverage import Measures, measure
-from nrdf.process.given_surface import GivenSurface, given_surface
+from nrdf.process.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.process.knowledge import Process
 from nrdf.process.lesson import Lesson
 from nrdf.process.patch import patches_of
@@ -50,11 +49,7 @@ def check(lesson: Lesson, progress: Callable[[int, int], None] | None = None) ->
     cloud = lesson.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
     surface = Surface(cloud.points, normals)
-    whole = lesson.cloud
-    if whole.normals is None:
-        nearest = cKDTree(cloud.points).query(whole.points)[1]
-        whole = replace(whole, normals=normals[nearest])
-    given = given_surface(whole)
+    given = given_surface(with_normals_of(lesson.cloud, replace(cloud, normals=normals)))
     regions = {name: np.flatnonzero(np.isin(kept, of)) for name, of in lesson.regions.items()}
     steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.steps]
     checked = []

@@ -30,7 +30,7 @@ from nrdf.output import output_folder
 from nrdf.process.carry import carry
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.coverage import Measures, measure
-from nrdf.process.given_surface import GivenSurface, given_surface
+from nrdf.process.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.process.knowledge import Line, Process, Transfer
 from nrdf.process.lesson import Lesson, overlaps, unit_and_doubts
 from nrdf.process.plan import drive, plan
@@ -138,6 +138,7 @@ class Teacher:
         marked: Mapping[str, ArrayLike] | None = None,
         progress: Callable[[int, int], None] | None = None,
         doubts: Sequence[str] | None = None,
+        whole: PointCloud | None = None,
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
@@ -149,7 +150,8 @@ class Teacher:
         target, by name, as `region_indices` takes them, points in metres; they are taken as they
         are, and a mask that is False everywhere says that the region is not there. `progress` is
         told (done, all) steps. doubts: what is doubtful about the target's pose and unit; unless
-        given, its unit is judged here, and logged as a warning where it is doubtful. Raises
+        given, its unit is judged here, and logged as a warning where it is doubtful. whole: the
+        target before it was thinned, in metres, by which tool paths are judged. Raises
         CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
         RegionError for a marked region that is not taught or not on the target, ConfigError for a
         `min_confidence` that is no share.
@@ -177,7 +179,7 @@ class Teacher:
         start = time.perf_counter()
         way.target.edges  # noqa: B018, what all paths share
         cloud = with_normals(embedded)
-        given = given_surface(cloud)
+        given = given_surface(cloud if whole is None else with_normals_of(whole, cloud))
         steps, paths = self.steps(), []
         with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
             planned = [pool.submit(self._path, *step, found[step[0]], way, given) for step in steps]

@@ -25,6 +25,7 @@ _NEIGHBOURS = 12
 _SPARSER = 2.5  # times the neighbours' distances to theirs, from which a point is an outlier
 _GAP = 0.05  # of the longest side: parts nearer to each other than this are one object
 _FLATTER = 0.25  # heights count for less: parts above each other are one object
+_BETWEEN = 2.0  # distances between kept points within which a thinned one is of the object too
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,17 @@ class Cleaned:
     steps: tuple[Step, ...]
     floor: Plane | None
     others: int
+
+
+def unthinned(scan: PointCloud, cleaned: Cleaned) -> PointCloud:
+    """All points of a scan that are the object's: those that were kept, and, where the scan was
+    thinned, those between them."""
+    if not any(step.name == "thin" and step.removed for step in cleaned.steps):
+        return cleaned.cloud
+    tree = cKDTree(cleaned.cloud.points)
+    apart = float(np.median(tree.query(cleaned.cloud.points, 2)[0][:, 1]))
+    near = tree.query(scan.points, distance_upper_bound=_BETWEEN * apart)[0]
+    return scan.select(np.isfinite(near))
 
 
 def clean_scan(

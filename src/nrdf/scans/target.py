@@ -14,7 +14,7 @@ from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.scans.align import Alignment, align_scan
-from nrdf.scans.clean import Cleaned, clean_scan
+from nrdf.scans.clean import Cleaned, clean_scan, unthinned
 from nrdf.scans.judge import Judge
 from nrdf.similarity import Similarity, up_axis
 from nrdf.units import METRES, Unit, find_unit
@@ -55,6 +55,11 @@ class AlignedScan:
         pose = self.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
         cloud = in_metres(self.cleaned.cloud, unit)
         return self.judge.model.embed(cloud, pose, self._is_one_sided)
+
+    def unthinned_in_metres(self, unit: str) -> PointCloud:
+        """All points of the object that the scan has, thinned or not, in metres, the scan being in
+        `unit`: what results are judged by."""
+        return in_metres(unthinned(self.scan, self.cleaned), unit)
 
     @property
     def _is_one_sided(self) -> bool:
