@@ -12,20 +12,19 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import json
 import re
-import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from nrdf.errors import DataError, unknown_name
+from nrdf.files import read_file
+from nrdf.formats.arrays import Arrays, open_arrays
 from nrdf.geometry import canonical_transform
 from nrdf.mesh import MOST_FACES, check_mesh, clean_faces
+from nrdf.plain_data import read_json
 
 LABELS, INDEX = "labels.json", "index.csv"
 IGNORED, BACKGROUND = ("mixed",), ("other",)
@@ -33,11 +32,6 @@ IGNORED, BACKGROUND = ("mixed",), ("other",)
 _MOST_LABELS = 1000
 _MOST_TEXT = 10_000_000  # bytes of labels.json and index.csv
 _WORD = re.compile(r"\w[\w.-]{0,99}")
-_UNREADABLE = (
-    OSError, ValueError, EOFError, KeyError, RuntimeError, NotImplementedError, SyntaxError,
-    OverflowError, MemoryError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-"""What damaged archives and arrays have been seen to raise."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +89,13 @@ def read_labels(folder: Path) -> Labels:
     """
     path = folder / LABELS
     try:
-        content = json.loads(_read_text(path))
+        content = read_json(_read_text(path))
         names = {int(number): str(name) for name, number in content["labels"].items()}
         ignored, background = (
             tuple(map(str, content.get(key, usual)))
             for key, usual in (("ignored", IGNORED), ("background", BACKGROUND))
         )
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise DataError(
             f'{path}: expected {{"labels": {{"seat": 1, "leg": 2}}}}, and perhaps "ignored" and '
             f'"background", lists of such names ({error})'
@@ -148,17 +142,14 @@ def read_object(folder: Path, listed: Listed, labels: Labels) -> LabelledMesh:
     Raises DataError if its file is missing, damaged, too large, or a face's label has no name.
     """
     path = folder / listed.category / f"{listed.name}.npz"
-    try:
-        with zipfile.ZipFile(path) as archive:
-            fine = "face_label_fine.npy" in archive.namelist()
-            vertices = _read_array(archive, "vertices", 3, "f")
-            faces = _read_array(archive, "faces", 3, "iu")
-            number = _read_array(archive, "face_label_fine" if fine else "face_label", 1, "iu")
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    except FileNotFoundError:
-        raise DataError(f"{folder}: {INDEX} lists {listed.key}, but there is no {path}") from None
-    except _UNREADABLE as error:
-        raise DataError(f"{path}: damaged, or no labelled mesh ({error})") from None
+    if not path.is_file():
+        raise DataError(f"{folder}: {INDEX} lists {listed.key}, but there is no {path}")
+    with open_arrays(path, DataError) as arrays:
+        fine = "face_label_fine" in arrays.names
+        vertices = _load(arrays, "vertices", 3, "f")
+        faces = _load(arrays, "faces", 3, "iu")
+        number = _load(arrays, "face_label_fine" if fine else "face_label", 1, "iu")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
     if len(number) != len(faces):
         raise DataError(f"{path}: {len(number)} labels for {len(faces)} faces; one each is needed")
     unknown = sorted({*number.tolist()} - {*labels.names})
@@ -192,35 +183,24 @@ def read_objects(folder: Path, categories: Sequence[str] = ()) -> list[LabelledM
 
 def _read_text(path: Path) -> str:
     try:
-        if path.stat().st_size > _MOST_TEXT:
-            raise DataError(f"{path}: larger than {_MOST_TEXT} bytes")
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        return read_file(path, DataError, _MOST_TEXT).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: no UTF-8 text ({error})") from None
+    except DataError as error:
         raise DataError(
-            f"cannot read {path} ({error}); a folder of labelled objects has {LABELS}, {INDEX} and "
+            f"{error}; a folder of labelled objects has {LABELS}, {INDEX} and "
             "<category>/<name>.npz (docs/benchmark.md)"
         ) from None
 
 
-def _read_array(archive: zipfile.ZipFile, name: str, columns: int, kinds: str) -> np.ndarray:
-    """An array (n,) or (n, columns), of which no more is read than its header may say."""
-    if f"{name}.npy" not in archive.namelist():
-        raise ValueError(f"it has no array '{name}'")
-    with archive.open(f"{name}.npy") as member:
-        shape, dtype = _header(member)
-    wanted = (shape[:1]) if columns == 1 else (*shape[:1], columns)
-    if not shape or shape != wanted or dtype.kind not in kinds or shape[0] > MOST_FACES:
+def _load(arrays: Arrays, name: str, columns: int, kinds: str) -> np.ndarray:
+    """An array (n,) or (n, columns), whose head was looked at before. Raises ValueError."""
+    if name not in arrays.names:
+        raise ValueError(f"it has no array '{name}', only: {', '.join(arrays.names)}")
+    shape, kind = arrays.head(name)
+    wanted = shape[:1] if columns == 1 else (*shape[:1], columns)
+    if not shape or shape != wanted or kind.kind not in kinds or shape[0] > MOST_FACES:
         raise ValueError(
-            f"'{name}' is {shape} of {dtype}; expected at most {MOST_FACES} rows of {columns}"
+            f"'{name}' is {shape} of {kind}; expected at most {MOST_FACES} rows of {columns}"
         )
-    with archive.open(f"{name}.npy") as member:
-        return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
-
-
-def _header(member: IO[bytes]) -> tuple[tuple[int, ...], np.dtype]:
-    version = np.lib.format.read_magic(member)  # type: ignore[arg-type]
-    read = np.lib.format.read_array_header_1_0
-    if version != (1, 0):
-        read = np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(member)  # type: ignore[arg-type]
-    return shape, dtype
+    return arrays.load(name)
