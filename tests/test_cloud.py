@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 from nrdf.cloud import PointCloud, check_cloud, read_cloud, write_cloud
 from nrdf.errors import CloudError, OutputError
 from nrdf.ply import read_header, read_scalars
+from nrdf.scans.clean import clean_scan
 
 POINTS = np.array([[0.0, 1.0, 2.0], [3.5, -4.0, 5.0], [0.25, 0.5, 1e-3], [7.0, 8.0, 9.0]])
 NORMALS = np.eye(3)[[0, 1, 2, 0]]
@@ -362,3 +363,37 @@ def test_a_cloud_checks_its_shapes_and_selects():
     for points, normals in ((POINTS[:, :2], None), (POINTS, NORMALS[:2]), (POINTS.ravel(), None)):
         with pytest.raises(CloudError):
             PointCloud(points, normals)
+
+
+WHOLE = np.random.default_rng(0).normal(size=(300, 3))
+
+
+@pytest.mark.parametrize(
+    ("cloud", "words"),
+    [
+        (PointCloud(1e30 * WHOLE), "at most 1e[+]12 are read"),
+        (PointCloud(1e160 * WHOLE), "at most 1e[+]12 are read"),
+        (PointCloud(1e-160 * WHOLE), "at least 1e-09 is needed"),
+        (PointCloud(WHOLE, np.full((300, 3), np.nan)), "300 of the cloud's 300 normals are zero"),
+        (PointCloud(WHOLE, np.eye(300, 3)), "297 of the cloud's 300 normals are zero"),
+    ],
+)
+def test_what_numbers_cannot_hold_is_refused(cloud, words):
+    for check in (lambda: check_cloud(cloud, 256), lambda: clean_scan(cloud)):
+        with pytest.raises(CloudError, match=words):
+            check()
+
+
+@pytest.mark.parametrize("length", [1e-5, 0.5, 1.01, 1e160, 1e300])
+def test_normals_are_brought_to_unit_length(length):
+    unit = WHOLE / np.linalg.norm(WHOLE, axis=1, keepdims=True)
+    np.testing.assert_allclose(PointCloud(WHOLE, length * unit).normals, unit, atol=1e-12)
+    assert np.array_equal(PointCloud(WHOLE, unit).normals, unit)
+
+
+@pytest.mark.parametrize("place", [np.nan, np.inf, 1e30])
+def test_sensors_that_stand_nowhere_are_refused(place):
+    with pytest.raises(CloudError, match="a sensor's place is"):
+        PointCloud(WHOLE, sensors=[[0.0, place, 0.0]])
+    with pytest.raises(CloudError, match="sensors must have the shape"):
+        PointCloud(WHOLE, sensors=[1.0, 2.0])

@@ -225,3 +225,21 @@ def test_normals_of_a_partial_cloud_point_to_the_sensors_that_saw_it():
         turned = 1000 * points[:, [1, 2, 0]]
         moved = estimate_normals(turned, sensors=1000 * sensors[:, [1, 2, 0]])
         assert ((moved * true[:, [1, 2, 0]]).sum(axis=1) > 0.5).mean() > least
+
+
+def test_a_sensor_very_far_off_tells_sides_as_one_that_is_far():
+    points, normals = box(np.random.default_rng(0), 3000, np.ones(3))
+    corner = np.array([[1.0, 1.0, 1.0]])
+    found = [estimate_normals(points, sensors=far * corner) for far in (50.0, 1e21)]
+    seen = normals @ corner[0] > 0
+    for estimated in found:
+        assert (np.einsum("na,na->n", estimated, normals)[seen] > 0).mean() > 0.97
+
+
+def test_a_sensor_at_a_point_and_most_points_in_one_place_give_normals():
+    points = np.concatenate(
+        [box(np.random.default_rng(0), 300, np.ones(3))[0], np.zeros((3000, 3))]
+    )
+    for sensors in (None, points[:1]):
+        found = estimate_normals(points, sensors=sensors)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-6)

@@ -13,12 +13,13 @@ from nrdf import ply
 from nrdf.errors import CloudError, DataError
 from nrdf.files import open_file
 from nrdf.formats import reader_of
-from nrdf.mesh import Mesh, check_size
+from nrdf.mesh import FARTHEST, Mesh, check_size
 from nrdf.units import METRES
 
 logger = logging.getLogger(__name__)
 
 MOST_DROPPED = 0.01  # largest share of points that may have NaN or infinite coordinates
+SHORTEST = 1e-9  # longest side of a cloud's bounding box, at least
 FLATTEST = 1e-3  # least ratio of the smallest to the largest extent (standard deviations)
 
 
@@ -26,7 +27,8 @@ FLATTEST = 1e-3  # least ratio of the smallest to the largest extent (standard d
 class PointCloud:
     """Points on an object's surface.
 
-    points: (n, 3) float64, finite; normals: (n, 3) float64, unit length, outward, or None;
+    points: (n, 3) float64, finite; normals: (n, 3) float64, outward, or None, brought to unit
+    length;
     unit: "m", "mm", … or None where the file does not say; frame: name of the coordinate frame, or
     None; colours: (n, 3) uint8 or None; intensity: (n,) float32 or None; sensors: (s, 3) float64,
     where the sensors stood that saw the points, in the same frame and unit, or None if unknown;
@@ -52,7 +54,7 @@ class PointCloud:
             normals = np.ascontiguousarray(self.normals, dtype=np.float64)
             if normals.shape != points.shape:
                 raise CloudError(f"{normals.shape} normals do not fit {points.shape} points")
-            object.__setattr__(self, "normals", normals)
+            object.__setattr__(self, "normals", _of_unit_length(normals))
         if self.colours is not None and np.shape(self.colours) != points.shape:
             raise CloudError(f"{np.shape(self.colours)} colours do not fit {points.shape} points")
         if self.intensity is not None and np.shape(self.intensity) != points.shape[:1]:
@@ -60,7 +62,15 @@ class PointCloud:
                 f"{np.shape(self.intensity)} intensities do not fit {points.shape} points"
             )
         if self.sensors is not None:
-            sensors = np.asarray(self.sensors, dtype=np.float64).reshape(-1, 3)
+            sensors = np.atleast_2d(np.asarray(self.sensors, dtype=np.float64))
+            if sensors.size and (sensors.ndim != 2 or sensors.shape[1] != 3):
+                raise CloudError(f"sensors must have the shape (s, 3), not {sensors.shape}")
+            sensors = sensors.reshape(-1, 3)
+            if not (np.abs(sensors) <= FARTHEST).all():
+                raise CloudError(
+                    f"a sensor's place is {sensors[~(np.abs(sensors) <= FARTHEST)][0]:.3g} along "
+                    f"an axis; give numbers up to {FARTHEST:g}, or leave out what is not known"
+                )
             object.__setattr__(self, "sensors", sensors if len(sensors) else None)
 
     def __len__(self) -> int:
@@ -137,16 +147,30 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
 
 
 def unit_normals(name: str, cloud: PointCloud) -> PointCloud:
-    """The cloud with its normals brought to unit length, or without them, with a warning, where
-    some are missing. name: what it is, for the warning."""
-    if cloud.normals is None:
-        return cloud
-    with np.errstate(over="ignore", invalid="ignore"):
-        length = np.linalg.norm(cloud.normals, axis=1, keepdims=True)
-    if not (np.isfinite(length) & (length > 1e-6)).all():
+    """The cloud, whose normals have unit length, or without them, with a warning, where some are
+    missing. name: what it is, for the warning."""
+    if cloud.normals is not None and not _has_unit_length(cloud.normals).all():
         logger.warning("%s: some normals are zero or not finite; all are left out", name)
         return replace(cloud, normals=None)
-    return replace(cloud, normals=cloud.normals / length)
+    return cloud
+
+
+def _of_unit_length(normals: np.ndarray) -> np.ndarray:
+    """Normals (n, 3) brought to unit length; what has none stays."""
+    good = _has_unit_length(normals)
+    if good.all():
+        return normals
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        # The largest component first: squares of what is very large or small are lost.
+        scaled = normals / np.abs(normals).max(axis=1, keepdims=True)
+        scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
+    usable = ~good & np.isfinite(scaled).all(axis=1) & (np.abs(normals).max(axis=1) > 1e-6)
+    return np.where(usable[:, None], scaled, normals)
+
+
+def _has_unit_length(normals: np.ndarray) -> np.ndarray:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.abs(np.einsum("na,na->n", normals, normals) - 1.0) < 1e-6
 
 
 def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
@@ -155,6 +179,37 @@ def in_metres(cloud: PointCloud, unit: str) -> PointCloud:
     sensors = None if cloud.sensors is None else cloud.sensors * length
     mesh = None if cloud.mesh is None else cloud.mesh.scaled(length)
     return replace(cloud, points=cloud.points * length, sensors=sensors, unit="m", mesh=mesh)
+
+
+def check_coordinates(cloud: PointCloud) -> None:
+    """Raise CloudError unless all that is computed of `cloud` stays within what numbers hold.
+
+    Points must be finite, none beyond 1e12, their longest side at least 1e-9 and a millionth of a
+    millionth of their distance from the origin; normals must have a length.
+    """
+    if not np.isfinite(cloud.points).all():
+        raise CloudError("the cloud has NaN or infinite coordinates; remove those points")
+    try:
+        check_size(cloud.points)
+    except DataError as error:
+        raise CloudError(f"the cloud {error}") from error
+    if not len(cloud):
+        return
+    side = float(np.ptp(cloud.points, axis=0).max())
+    if side <= 1e-12 * float(np.abs(cloud.points).max()):
+        raise CloudError("all points of the cloud coincide; a cloud of a whole object is needed")
+    if side < SHORTEST:
+        raise CloudError(
+            f"the cloud's longest side is {side:.3g}; at least {SHORTEST:g} is needed: give it in "
+            "a smaller unit"
+        )
+    if cloud.normals is not None:
+        missing = int((~_has_unit_length(cloud.normals)).sum())
+        if missing:
+            raise CloudError(
+                f"{missing} of the cloud's {len(cloud)} normals are zero or not finite; give all "
+                "of them, or none: they are estimated then"
+            )
 
 
 def check_cloud(cloud: PointCloud, minimum_points: int) -> None:
@@ -166,12 +221,9 @@ def check_cloud(cloud: PointCloud, minimum_points: int) -> None:
             f"the cloud has {len(cloud)} points; at least {minimum_points} are needed: "
             "scan or sample it more densely"
         )
-    if not np.isfinite(cloud.points).all():
-        raise CloudError("the cloud has NaN or infinite coordinates; remove those points")
+    check_coordinates(cloud)
     offset = cloud.points - cloud.points.mean(axis=0)
     largest = float(np.abs(offset).max())
-    if largest == 0.0 or largest <= 1e-12 * float(np.abs(cloud.points).max()):
-        raise CloudError("all points of the cloud coincide; a cloud of a whole object is needed")
     offset = offset / largest
     extent = np.sqrt(np.maximum(np.linalg.eigvalsh(offset.T @ offset / len(offset)), 0.0))[::-1]
     kind = "collinear" if extent[1] < FLATTEST * extent[0] else "flat"

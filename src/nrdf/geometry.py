@@ -19,6 +19,9 @@ _BOTH_SIDES = 0.4  # directions that see a point from its far side, to those fro
 # Share of points seen from both sides from which a cloud is open: whole chairs and aircraft have
 # 0.06 at most, simulated scans of three views 0.29 or more.
 _OPEN = 0.15
+_LEAST_SPACING = 0.1  # between points, where one longest side has the square root of their number
+_SMALLEST = 1e-30  # a length that single precision holds
+_FAR, _TOUCHING = 1000.0, 1e-6  # from sensor to object, canonical, at most and at least
 
 
 def bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -77,11 +80,11 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
             kept = kept[np.unique(rng.integers(0, len(kept), 64 * count))]
     kept = rng.permutation(kept)
     candidates = points[kept]
-    small, large = side * 1e-4, side
+    small, large = 1e-4, 1.0
     best = np.empty(0, dtype=np.int64)
     for _ in range(24):
         cell = float(np.sqrt(small * large))
-        chosen = one_per_cell(candidates, lowest, cell)
+        chosen = one_per_cell(candidates, lowest, cell * side)
         if len(chosen) >= count:
             best, small = chosen, cell
             if len(chosen) <= 1.02 * count:
@@ -136,13 +139,13 @@ def estimate_normals(
     points = ((points - middle) / scale).astype(np.float32)
     neighbours = min(neighbours, len(points))
     distance, index = _nearest(points, neighbours)
-    spacing = _spacing(distance)
+    spacing = _spacing(points, distance)
     closeness = np.exp(-((distance / (distance[:, neighbours // 2, None] + 1e-12)) ** 2)) + 1e-6
 
     if sensors is None:
         toward = _seen_from(points, None, fibonacci_directions(directions * 3 // 5), spacing, 0.7)
     else:
-        sensors = ((np.asarray(sensors) - middle) / scale).astype(np.float32)
+        sensors = _nearer((np.asarray(sensors) - middle) / scale).astype(np.float32)
         toward = _seen_by(points, None, sensors, spacing)
     toward /= np.linalg.norm(toward, axis=1, keepdims=True) + 1e-6
     same_side = np.maximum(np.einsum("nka,na->nk", toward[index], toward), 0.01) ** 2
@@ -169,7 +172,7 @@ def visibility(
     Points inside a hull are seen by few or none.
     """
     points, normals = points.astype(np.float32), normals.astype(np.float32)
-    spacing = _spacing(_nearest(points, min(9, len(points)))[0])
+    spacing = _spacing(points, _nearest(points, min(9, len(points)))[0])
     vote = np.zeros(len(points))
     front, back = np.zeros((2, len(points)), dtype=np.int64)
     views = fibonacci_directions(directions)
@@ -202,7 +205,7 @@ def seen_from(
     (n, 3)) being above `steepest`, and nothing may lie before it.
     """
     points, normals = points.astype(np.float32), normals.astype(np.float32)
-    spacing = _spacing(_nearest(points, min(9, len(points)))[0])
+    spacing = _spacing(points, _nearest(points, min(9, len(points)))[0])
     images = _depth_images(points, normals, views, spacing, 0.4)
     return np.array([seen & (normals @ view > steepest) for view, seen in images])
 
@@ -213,10 +216,16 @@ def _nearest(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return distance.astype(np.float32), index
 
 
-def _spacing(distance: np.ndarray) -> float:
-    """Typical distance between points: the side of the square that each has to itself."""
+def _spacing(points: np.ndarray, distance: np.ndarray) -> float:
+    """Typical distance between points: the side of the square that each has to itself.
+
+    Not less than if all had a hundredth of the square of the longest side to themselves: where most
+    points coincide, depth images would have more cells than memory holds.
+    """
     column = min(8, distance.shape[1] - 1)
-    return float(np.median(distance[:, column])) * float(np.sqrt(np.pi / (column + 1)))
+    typical = float(np.median(distance[:, column])) * float(np.sqrt(np.pi / (column + 1)))
+    side = float(np.ptp(points, axis=0).max())
+    return max(typical, _LEAST_SPACING * side / float(np.sqrt(len(points))), _SMALLEST)
 
 
 def _principal_normals(points: np.ndarray, index: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -266,6 +275,13 @@ def _seen_from(
     return toward
 
 
+def _nearer(sensors: np.ndarray) -> np.ndarray:
+    """Sensors (s, 3) around the origin, those very far off brought nearer in their direction: at
+    a thousand longest sides they see the same, and single precision tells points apart."""
+    distance = np.linalg.norm(sensors, axis=1, keepdims=True)
+    return sensors * (_FAR / np.maximum(distance, _FAR))
+
+
 def _seen_by(
     points: np.ndarray, normals: np.ndarray | None, sensors: np.ndarray, spacing: float
 ) -> np.ndarray:
@@ -279,7 +295,7 @@ def _seen_by(
     toward = np.zeros_like(points)
     for sensor in sensors:
         offset = sensor - points
-        distance = np.linalg.norm(offset, axis=1)
+        distance = np.maximum(np.linalg.norm(offset, axis=1), _TOUCHING)
         offset /= distance[:, None]
         axis = sensor / max(float(np.linalg.norm(sensor)), 1e-6)
         helper = np.eye(3, dtype=np.float32)[int(np.abs(axis).argmin())]

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from nrdf.cloud import PointCloud
+from nrdf.cloud import PointCloud, check_coordinates
 from nrdf.errors import CloudError, unknown_name
 from nrdf.geometry import bounding_box, thin
 from nrdf.scans.floor import Plane, find_floor
@@ -74,12 +74,13 @@ def clean_scan(
     largest.
 
     up: (3,) unit vector, None if unknown. skip: those of `STEPS` to leave out. Raises CloudError
-    for an unknown step, or where fewer than `minimum_points` remain (naming the step that took
-    most).
+    for an unknown step, coordinates that nothing can be computed of, or where fewer than
+    `minimum_points` remain (naming the step that took most).
     """
     for name in skip:
         if name not in STEPS:
             raise CloudError(unknown_name("step of cleaning", name, STEPS))
+    check_coordinates(scan)
     rng = np.random.default_rng(0)
     kept = np.arange(len(scan))
     steps: list[Step] = []
