@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.process.contour import contour, spiral
+from nrdf.process.effort import check_effort, check_passes
 from nrdf.process.frames import lean_rotation, steady, surface_frames, travel_of
 from nrdf.process.lines import Line, nearest_first, on_surface
 from nrdf.process.patch import Patch, inside_margin, patches_of
@@ -26,6 +27,7 @@ Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
 TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_LEAST, _MOST = 1e-9, 1e6  # of every quantity: beyond, sums and squares are no longer numbers
 _TRIES, _WIDE = 3, 1.1  # of lines that are more stepovers apart
 
 
@@ -71,12 +73,15 @@ class Strategy:
             raise ProcessError(unknown_name("trajectory", self.trajectory, TRAJECTORIES))
         above = ("stepover_m", "spacing_m", "tool_radius_m", "feed_m_s", "approach_feed_m_s")
         for name in (*above, "retract_feed_m_s", "passes"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ProcessError(f"{name} is {getattr(self, name)}; give a value above 0")
+            if not _LEAST <= getattr(self, name) <= _MOST:
+                given = f"{name} is {getattr(self, name)}"
+                raise ProcessError(f"{given}; give a value above 0 ({_LEAST:g} to {_MOST:g})")
         lengths = ("edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m")
         for name in (*lengths, "retract_distance_m", "dwell_s"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ProcessError(f"{name} is {getattr(self, name)}; give 0 or more")
+            if not 0.0 <= getattr(self, name) <= _MOST:
+                raise ProcessError(
+                    f"{name} is {getattr(self, name)}; give 0 or more, at most {_MOST:g}"
+                )
         if self.direction is not None:
             direction = np.asarray(self.direction, dtype=np.float64)
             if direction.shape != (3,) or not 0.0 < np.linalg.norm(direction) < np.inf:
@@ -91,11 +96,12 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     process and departure segments; an approach or retract distance of 0 leaves its segments out.
     Places without room for the tool (`nrdf.process.room`) are left out like holes. Raises
     ProcessError for a margin or clearance that leaves nothing of the region, a stepover wider than
-    it, or a direction that stands on it.
+    it, a direction that stands on it, or more than `nrdf.process.effort` allows.
     """
     region = with_room(surface, region, strategy.clearance_m)
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
+    check_effort(patches, strategy)
     lines: list[Line] = []
     for sweep in _sweeps(patches, strategy):
         found = [
@@ -128,8 +134,9 @@ def drive(
 
     lines: positions (n, 3), m, of the tool centre point, and quaternions_xyzw (n, 4), for each;
     normals: (n, 3), outward, of the surface under each. Every second pass drives the lines
-    backwards, the tool turned half around the normal.
+    backwards, the tool turned half around the normal. Raises ProcessError for too many of them.
     """
+    check_passes(sum(len(line[0]) for line in lines), len(lines), strategy.passes)
     segments: list[Segment] = []
     number = 0
     for index in range(strategy.passes):

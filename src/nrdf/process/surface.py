@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SURE = 0.5  # share of one of fewer points that are a plane, as at the end of a thin part
 _SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
+_AT_ONCE = 8192  # places: what is known of each takes many times its own memory
 _ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
@@ -160,7 +162,12 @@ class Surface:
         self, points: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Places and normals as of `project`, and whether (m,) there is a surface around."""
-        points, normals = np.array(points, dtype=np.float64), unit(normals)
+        found = _in_parts(self._settled_at_once, np.array(points, np.float64), unit(normals))
+        return found[0], found[1], found[2]
+
+    def _settled_at_once(
+        self, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         near = self._nearest_to(points, 3 * _FITTED)
         around, facing = self.points[near], self.normals[near]
         fitted = np.zeros(len(points), bool)
@@ -223,9 +230,14 @@ class Surface:
         That is the sheet within `radius_m` whose normals turn less than 60° from the average
         itself, which is found from `normals` (m, 3): what a flat tool of that radius feels.
         """
+        points = np.asarray(points, dtype=np.float64)
+        return _in_parts(partial(self._smooth_at_once, radius_m), points, unit(normals))[0]
+
+    def _smooth_at_once(
+        self, radius_m: float, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray]:
         radius = max(radius_m, 2.0 * self.spacing)
         count = int(np.clip(2.0 * np.pi * (radius / self.spacing) ** 2, 16, 256))
-        points, normals = np.asarray(points, dtype=np.float64), unit(normals)
         near = self._nearest_to(points, count)
         offset, around = self.points[near] - points[:, None], self.normals[near]
         turning = np.arange(len(points))
@@ -241,7 +253,7 @@ class Surface:
             turning = turning[turned]
             if not len(turning):
                 break
-        return normals
+        return (normals,)
 
     def _nearest_to(self, points: np.ndarray, count: int) -> np.ndarray:
         return self.tree.query(points, min(count, len(self.points)))[1]
@@ -295,3 +307,15 @@ def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.n
     normal = weighted @ basis.transpose(0, 2, 1)
     normal += np.diag([1e-9, 1e-5, 1e-5, 3e-3, 3e-3, 3e-3])
     return np.linalg.solve(normal, weighted @ values)
+
+
+def _in_parts(
+    call: Callable[..., tuple[np.ndarray, ...]], *arrays: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """`call` of arrays (m, ...), whose rows do not concern each other, a part of them at a time."""
+    # Rows are written to: a part must not be a view of what was given.
+    parts = [
+        call(*(array[first : first + _AT_ONCE].copy() for array in arrays))
+        for first in range(0, max(len(arrays[0]), 1), _AT_ONCE)
+    ]
+    return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
