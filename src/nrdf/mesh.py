@@ -20,12 +20,13 @@ from nrdf.files import open_file, read_file
 from nrdf.geometry import visibility
 
 MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
-MOST_FACES = 2_500_000
+MOST_FACES = 1_800_000
 FARTHEST = 1e12
 """The largest coordinate that is read, in any unit; beyond it are damaged files only, and numbers
 that cannot be squared."""
 SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
 _HASH = np.uint64(0x9E3779B97F4A7C15)  # odd, with evenly spread bits
+_PART = 1 << 17  # faces
 _MOST_BESIDE = 250_000_000  # bytes of a file that a mesh names
 _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
 
@@ -79,10 +80,11 @@ def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
                 file,
                 file_type=path.suffix.lower()[1:],
                 resolver=beside,
-                force="mesh",
                 process=False,
                 skip_materials=True,  # and the pictures that they name
             )
+            if isinstance(mesh, trimesh.Scene):
+                mesh = mesh.to_mesh()
         except NrdfError as error:
             why = str(error).removeprefix(f"{path}: ")
             raise DataError(f"{path}: unreadable as a mesh: {why}") from error
@@ -102,7 +104,7 @@ def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
 
 def check_size(points: np.ndarray) -> None:
     """Raise DataError for points (n, 3), finite, with coordinates beyond those of any object."""
-    if (largest := np.abs(points).max(initial=0.0)) > FARTHEST:
+    if (largest := max(points.max(initial=0.0), -points.min(initial=0.0))) > FARTHEST:
         raise DataError(
             f"has coordinates of {largest:.3g}; at most {FARTHEST:g} are read: it is damaged, or "
             "no object"
@@ -164,21 +166,29 @@ def clean_faces(
     vertices: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `clean` gives, and which of the faces (f,) are left: (k,), ascending."""
-    used, faces = np.unique(faces, return_inverse=True)
+    # Step by step, and faces in parts: meshes of millions of faces are usual.
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    faces = (np.cumsum(used) - 1)[faces]
     vertices = vertices[used]
     extent = float(np.ptp(vertices, axis=0).max())
     # Exactly equal ones only: a tolerance glues inner to outer walls, which turns the inner ones.
-    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)
     key: np.ndarray = np.zeros(len(vertices), dtype=np.uint64)
     for axis in range(3):  # a hash of 64 bits
-        key = (key ^ bits[:, axis] ^ (bits[:, axis] >> np.uint64(29))) * _HASH
+        bits = (vertices[:, axis] + 0.0).view(np.uint64)
+        key ^= bits
+        key ^= bits >> np.uint64(29)
+        key *= _HASH
         key ^= key >> np.uint64(32)
+    del bits
     _, first, merged = np.unique(key, return_index=True, return_inverse=True)
-    vertices, faces = vertices[first], merged[faces.reshape(-1, 3)]
-    corners = vertices[faces]
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    vertices, faces = vertices[first], merged[faces]
+    del key, merged
+    area = np.empty(len(faces))
+    for start in range(0, len(faces), _PART):
+        part = slice(start, start + _PART)
+        a, b, c = (vertices[corner] for corner in faces[part].T)
+        area[part] = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     kept = np.flatnonzero(area > 1e-14 * extent**2)
     faces = faces[kept]
     if len(faces) == 0:
