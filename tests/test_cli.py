@@ -18,6 +18,7 @@ from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.ply import read_header, read_scalars
 from nrdf.process.lesson import read_lesson
 from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.swap import MANIFEST
 
 VERBS = sorted(cli.verbs())
 
@@ -100,7 +101,7 @@ def test_retrieve_answers_in_the_targets_own_coordinates(retrieve, files, tmp_pa
     assert retrieve(method=[method]) == 0
     out = tmp_path / "deep" / "result"
     report = json.loads((out / "report.json").read_text())
-    assert {p.name for p in out.iterdir()} == set(report["files"])
+    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["files"]}
     assert set(report["files"]) == {"seat.ply", "legs.ply", "picture.png", "report.json"}
     assert report["method"] == method
     assert report["model"]["preset"] == "default"
@@ -240,7 +241,8 @@ def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path
     out = tmp_path / "demo"
     assert cli.run(["demo", "--no-arm", "--model", str(untrained), "--out", str(out)]) == 0
     report = json.loads((out / "report.json").read_text())
-    assert {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()} == set(report["files"])
+    found = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()}
+    assert found == {MANIFEST, *report["files"]}
     rows = report["found"]
     assert len(rows) == 5
     for row in rows:

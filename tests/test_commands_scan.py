@@ -14,6 +14,7 @@ from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.ply import read_header, read_scalars
 from nrdf.shapes.families import get_family
 from nrdf.similarity import Similarity, about_up, up_axis, upright
+from nrdf.swap import MANIFEST
 from scenes import pose, scan_of, yaw_error
 
 SEED = 1_000_003
@@ -53,7 +54,7 @@ def test_align_writes_pose_object_and_picture(files, tmp_path, capsys):
     out = tmp_path / "aligned"
     assert run("align", files / "scan.ply", "--model", "chair", "--up", "z", "--out", out) == 0
     report = json.loads((out / "report.json").read_text())
-    assert {p.name for p in out.iterdir()} == set(report["files"])
+    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["files"]}
     assert set(report["files"]) == {"aligned.ply", "object.ply", "picture.png", "report.json"}
     found = similarity(report)
     assert yaw_error(found, PLACE) < 5 and found.scale == pytest.approx(850, rel=0.03)

@@ -18,6 +18,7 @@ from nrdf.export.options import Options
 from nrdf.export.prepare import strokes
 from nrdf.export.registry import FORMATS, export_job
 from nrdf.process.toolpath import Job, Segment, ToolPath, write_job
+from nrdf.swap import MANIFEST
 from read_programs import read_krl, read_lines, read_rapid, read_urscript
 
 DOWN = np.array([1.0, 0.0, 0.0, 0.0])
@@ -300,7 +301,7 @@ def test_verb_writes_beside_the_job_unless_told_where(tmp_path, capsys):
     out = tmp_path / "export"
     report = json.loads((out / "report.json").read_text())
     found = sorted(p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file())
-    assert sorted(report["files"]) == found
+    assert sorted([MANIFEST, *report["files"]]) == found
     assert report["formats"]["krl"] == ["krl/nrdf_plate.dat", "krl/nrdf_plate.src"]
     assert report["options"]["blend_mm"] == 0 and report["options"]["process_only"] is True
     assert "2 tool paths written to" in capsys.readouterr().out
@@ -308,7 +309,7 @@ def test_verb_writes_beside_the_job_unless_told_where(tmp_path, capsys):
         run(str(tmp_path), "--format", "csv")
     run(str(tmp_path / "toolpaths.json"), "--format", "apt", "--overwrite")
     left = sorted(p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file())
-    assert left == ["apt/nrdf_plate.apt", "report.json"]
+    assert left == [MANIFEST, "apt/nrdf_plate.apt", "report.json"]
 
 
 def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):

@@ -77,7 +77,7 @@ def test_panels_are_side_by_side_and_share_the_colours(tmp_path):
 
 
 def test_unwritable_path_is_an_output_error_and_leaves_nothing(tmp_path):
-    with pytest.raises(OutputError, match="cannot write the picture"):
+    with pytest.raises(OutputError, match=r"cannot write .*x.png"):
         draw_regions([Panel("ball", BALL, BALL)], tmp_path / "none" / "x.png", 60)
     assert list(tmp_path.iterdir()) == []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.errors import OutputError
 from nrdf.geometry import canonical_transform, estimate_normals, thin
+from nrdf.ply import write_atomically
 from nrdf.render import FRONT, Camera, Scene, Strokes, render
 
 if TYPE_CHECKING:
@@ -242,11 +243,7 @@ def add_legend(figure: Figure, colours: Mapping[str, np.ndarray]) -> None:
 
 def write_figure(figure: Figure, path: Path, dpi: int) -> None:
     """Write a matplotlib figure, whole or not at all. Raises OutputError if it cannot be."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix or '.png'}")
-    try:
-        figure.savefig(temporary, dpi=dpi, pil_kwargs={"compress_level": 4})
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"cannot write the picture {path}: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+    drawn = io.BytesIO()
+    ending = path.suffix.removeprefix(".") or "png"
+    figure.savefig(drawn, format=ending, dpi=dpi, pil_kwargs={"compress_level": 4})
+    write_atomically(path, [drawn.getbuffer()])

@@ -18,8 +18,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from nrdf.errors import CloudError, OutputError
+from nrdf.errors import CloudError
 from nrdf.files import open_file
+from nrdf.locks import cannot_write
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -356,7 +357,7 @@ def write_atomically(path: Path, parts: list[bytes | memoryview]) -> None:
                 file.write(part)
         os.replace(temporary, path)
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        raise cannot_write(path, error) from error
     finally:
         with suppress(OSError):
             temporary.unlink()

@@ -11,13 +11,14 @@ import logging
 import os
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from nrdf.errors import ConfigError, OutputError, unknown_name
+from nrdf.errors import ConfigError, unknown_name
 from nrdf.field.zoo import WEIGHTS
+from nrdf.locks import claim
 from nrdf.output import write_json
-from nrdf.training.checkpoint import IDENTITY, open_run
+from nrdf.training.checkpoint import COST, IDENTITY, open_run
 from nrdf.training.config import TrainConfig
 from nrdf.training.loop import run_identity, train
 from nrdf.training.provenance import list_shapes
@@ -36,7 +37,6 @@ OMITTED = {
 VARIANTS = (COMPLETE, *OMITTED)
 SCHEDULES = {"short": "paper-short", "full": "paper"}
 """Schedule to the configuration that it trains."""
-COST = "cost.json"
 
 
 def variant_config(config: TrainConfig, variant: str) -> TrainConfig:
@@ -131,27 +131,6 @@ def _timed(run: Path) -> Iterator[None]:
             write_json(run / COST, {"seconds": round(seconds, 3)})
 
 
-@contextmanager
-def _alone(out: Path, name: str) -> Iterator[None]:
-    """Other processes that want the same run wait meanwhile (not on Windows)."""
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        handle = os.open(out / f".{name}.lock", os.O_CREAT | os.O_RDWR)
-    except OSError as error:
-        raise OutputError(
-            f"cannot write to {out}: {error.strerror}; choose another --out"
-        ) from None
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            log.info("waiting for %s, which another process trains", out / name)
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
+def _alone(out: Path, name: str) -> AbstractContextManager[None]:
+    """Other processes that want the same run wait meanwhile; `train` refuses a second one."""
+    return claim(out / f"turn at {name}", wait=True)

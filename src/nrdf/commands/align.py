@@ -76,7 +76,7 @@ def align(
     """
     from nrdf.output import output_folder
 
-    with output_folder(out, overwrite) as folder:
+    with output_folder(out, overwrite, [scan, *reference, model]) as folder:
         import nrdf
         from nrdf.cloud import PointCloud
         from nrdf.picture import draw_regions

@@ -39,7 +39,7 @@ def export(
     check_formats(format)
     content = read_job(job)
     place = out or (job if job.is_dir() else job.parent) / "export"
-    with output_folder(place, overwrite) as folder:
+    with output_folder(place, overwrite, [job]) as folder:
         files = export_job(content, format, folder, programs)
         report = {"command": command_line(), "job": str(job), "options": asdict(programs)}
         write_report(folder, {**report, "formats": files})

@@ -57,15 +57,17 @@ def new(
         overwrite: Replace the file if there is one.
     """
     from nrdf.errors import OutputError
+    from nrdf.output import output_file
     from nrdf.process.knowledge_file import write_knowledge
     from nrdf.process.knowledge_new import PLACEHOLDER, new_knowledge
 
     if out.exists() and not overwrite:
         raise OutputError(f"{out} exists; give another name, or --overwrite to replace it")
-    content = new_knowledge(
-        reference, category, out.parent, region, kind, unit, model, allow_unusual
-    )
-    write_knowledge(out, content, explained=True)
+    with output_file(out, [reference, *region, model]):
+        content = new_knowledge(
+            reference, category, out.parent, region, kind, unit, model, allow_unusual
+        )
+        write_knowledge(out, content, explained=True)
     console.print(f"wrote {out}")
     if not region:
         console.print(
@@ -131,7 +133,7 @@ def schema(out: Path | None = None) -> None:
     """
     import json
 
-    from nrdf.output import write_json
+    from nrdf.output import output_file, write_json
     from nrdf.process.knowledge import Knowledge
 
     content = {
@@ -141,7 +143,8 @@ def schema(out: Path | None = None) -> None:
     if out is None:
         console.print_json(json.dumps(content))
     else:
-        write_json(out, content)
+        with output_file(out):
+            write_json(out, content)
         console.print(f"wrote {out}")
 
 

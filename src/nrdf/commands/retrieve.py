@@ -96,7 +96,7 @@ def retrieve(
     from nrdf.output import output_folder
 
     doubts: list[str] = []
-    with output_folder(out, overwrite) as folder:
+    with output_folder(out, overwrite, [reference, *region, target, model]) as folder:
         clock = Clock()
         import nrdf
         from nrdf.picture import draw_regions

@@ -62,42 +62,43 @@ def scan(
     from nrdf.cloud import write_cloud
     from nrdf.errors import DataError
     from nrdf.mesh import load_mesh
-    from nrdf.output import write_json
+    from nrdf.output import output_files, write_json
     from nrdf.scans.simulate import ScanSettings, simulate_scan
     from nrdf.similarity import Similarity, about_up, up_axis, upright
 
+    beside = out.with_suffix(".json")
     if out.suffix.lower() != ".ply":
         raise DataError(f"--out {out} must end in .ply")
-    rng = np.random.default_rng(seed)
-    turn = rng.uniform(0, 2 * np.pi) if yaw is None else np.radians(yaw)
-    pose = Similarity(upright(up_axis(up)) @ about_up(turn), np.array(offset), scale)
-    settings = ScanSettings(
-        views=views,
-        noise=noise,
-        quantisation=quantisation,
-        grazing=float(np.radians(grazing)),
-        distance=distance,
-        pixels=pixels,
-        floor=floor,
-    )
-    seen = simulate_scan(*load_mesh(mesh), settings, rng, pose, unit)
-    cloud = replace(seen.cloud, normals=seen.normals) if normals else seen.cloud
-    write_cloud(out, cloud, scalars={"view": seen.view, "face": seen.face})
-    truth = {
-        "command": command_line(),
-        "mesh": str(mesh),
-        "up": up,
-        "yaw_degrees": float(np.degrees(turn)),
-        "scale": scale,
-        "T_scan_mesh": pose.T_scan_canonical,
-        "sensors": seen.cloud.sensors,
-        "points": len(cloud),
-        "points_of_floor": int((seen.face < 0).sum()),
-        "unit": unit,
-    }
-    beside = out.with_suffix(".json")
-    write_json(beside, truth)
+    with output_files(out, beside, [mesh]) as folder:
+        rng = np.random.default_rng(seed)
+        turn = rng.uniform(0, 2 * np.pi) if yaw is None else np.radians(yaw)
+        pose = Similarity(upright(up_axis(up)) @ about_up(turn), np.array(offset), scale)
+        settings = ScanSettings(
+            views=views,
+            noise=noise,
+            quantisation=quantisation,
+            grazing=float(np.radians(grazing)),
+            distance=distance,
+            pixels=pixels,
+            floor=floor,
+        )
+        seen = simulate_scan(*load_mesh(mesh), settings, rng, pose, unit)
+        cloud = replace(seen.cloud, normals=seen.normals) if normals else seen.cloud
+        truth = {
+            "command": command_line(),
+            "mesh": str(mesh),
+            "up": up,
+            "yaw_degrees": float(np.degrees(turn)),
+            "scale": scale,
+            "T_scan_mesh": pose.T_scan_canonical,
+            "sensors": seen.cloud.sensors,
+            "points": len(cloud),
+            "points_of_floor": int((seen.face < 0).sum()),
+            "unit": unit,
+        }
+        write_cloud(folder / out.name, cloud, scalars={"view": seen.view, "face": seen.face})
+        write_json(folder / beside.name, truth)
     of_floor = f", {truth['points_of_floor']} of them of the floor" if floor else ""
     console.print(
-        f"{len(cloud)} points{of_floor} in {out}; the truth in {out.with_suffix('.json')}"
+        f"{len(cloud)} points{of_floor} in {out}; the truth in {beside}"
     )

@@ -54,7 +54,7 @@ def demo(
     from nrdf.bundled import REFERENCE, TARGETS
     from nrdf.output import output_folder
 
-    with output_folder(out, overwrite) as folder:
+    with output_folder(out, overwrite, [model]) as folder:
         results = _run(folder, model, device)
         simulated = _simulate(folder) if arm else None
     _show(results)

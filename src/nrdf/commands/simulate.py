@@ -60,7 +60,7 @@ def simulate(
     from nrdf.robot.simulate import simulate as run
     from nrdf.robot.solid import solid_from_file
 
-    with output_folder(out, overwrite) as folder:
+    with output_folder(out, overwrite, [job, robot, mesh]) as folder:
         work = read_work(job, up)
         arm = load_arm(robot, tool_frame)
         for line in arm.checked:

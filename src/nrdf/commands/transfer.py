@@ -86,7 +86,7 @@ def transfer(
     import math
 
     from nrdf.errors import CloudError, LimitError, NothingFoundError
-    from nrdf.output import output_folder
+    from nrdf.output import check_inputs, output_folder
     from nrdf.process.limits import Limits
 
     limits = Limits(
@@ -101,13 +101,14 @@ def transfer(
     )
     if up is None and (sensor or skip):
         raise CloudError("--sensor and --skip are for scans: give --up")
-    with output_folder(out, overwrite) as folder:
+    with output_folder(out, overwrite, [knowledge, target, *region, model]) as folder:
         import nrdf
         from nrdf.process.job_folder import write_transfer
-        from nrdf.process.lesson import read_lesson, unit_and_doubts
+        from nrdf.process.lesson import files_of, read_lesson, unit_and_doubts
         from nrdf.process.transfer import MIN_CONFIDENCE, Teacher
 
         lesson = read_lesson(knowledge)
+        check_inputs(out, files_of(lesson.knowledge, knowledge.parent))
         category = lesson.knowledge.category
         loaded = nrdf.load_model(model or category, device)
         scan = None

@@ -16,6 +16,7 @@ from nrdf.export.names import identifier, plain_text
 from nrdf.export.options import Options
 from nrdf.export.plain import describe
 from nrdf.export.prepare import prepare
+from nrdf.locks import writing
 from nrdf.process.toolpath import Job, Segment
 
 BAG = "bag"
@@ -27,7 +28,8 @@ _NOTES = (
 
 
 def write(job: Job, options: Options, folder: Path) -> None:
-    """Write the folder `bag`. Raises ProcessError where rosbags is not installed."""
+    """Write the folder `bag`. Raises ProcessError where rosbags is not installed, and
+    OutputError where the folder cannot be written."""
     try:
         from rosbags.rosbag2 import Writer
         from rosbags.typesys import Stores, get_typestore
@@ -38,7 +40,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     store = get_typestore(Stores.ROS2_HUMBLE)
     frame = plain_text(job.frame).replace(" ", "_")
-    with Writer(folder / BAG, version=8) as writer:
+    with writing(folder / BAG), Writer(folder / BAG, version=8) as writer:
 
         def send(topic: str, kind: str, message: Any, nanoseconds: int) -> None:
             known = (c for c in writer.connections if c.topic == topic)

@@ -125,6 +125,12 @@ def unit_and_doubts(
     return known, doubts
 
 
+def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:
+    """The files that knowledge refers to; their names count from `folder`."""
+    names = [knowledge.reference.cloud, *(region.file for region in knowledge.regions)]
+    return [Path(folder) / name for name in names if name is not None]
+
+
 def checksum(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal digits."""
     return hashlib.sha256(path.read_bytes()).hexdigest()

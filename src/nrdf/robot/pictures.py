@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.picture import region_colours
+from nrdf.ply import write_atomically
 from nrdf.robot.engine import mujoco
 from nrdf.robot.execute import Log
 from nrdf.robot.scene import specification
@@ -66,7 +68,9 @@ def _busiest(logs: Sequence[Log]) -> Log:
 def _save(path: Path, image: np.ndarray) -> None:
     from PIL import Image
 
-    Image.fromarray(image).save(path)
+    drawn = io.BytesIO()
+    Image.fromarray(image).save(drawn, "png")
+    write_atomically(path, [drawn.getbuffer()])
 
 
 def _film(
@@ -87,9 +91,12 @@ def _film(
         at = int(step - (ends[which] - len(item.joints)))
         images.append(Image.fromarray(studio.image(driven, item, at, *_FILM_SIZE)))
         progress(k + 1, _FRAMES)
+    film = io.BytesIO()
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=_FRAME_MS, loop=0, quality=60
-    )
+        film, "webp", save_all=True, append_images=images[1:], duration=_FRAME_MS, loop=0,
+        quality=60,
+    )  # fmt: skip
+    write_atomically(path, [film.getbuffer()])
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from nrdf.errors import RobotError
 from nrdf.export.names import identifier
+from nrdf.locks import writing
 from nrdf.ply import write_atomically
 from nrdf.robot.execute import Log
 from nrdf.robot.simulate import Simulated
@@ -65,7 +66,7 @@ def write_bag(folder: Path, simulated: Simulated) -> bool:
         whole, rest = divmod(round(value * 1e9), 1_000_000_000)
         return types[kind](whole, rest)
 
-    with Writer(folder / BAG, version=8) as writer:
+    with writing(folder / BAG), Writer(folder / BAG, version=8) as writer:
         clock = 0.0
         for number, driven in enumerate(simulated.paths, 1):
             topic = f"/nrdf/{identifier(f'p{number} {driven.path.region}', 48)}/joint_trajectory"

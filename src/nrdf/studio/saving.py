@@ -14,7 +14,7 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.export.registry import export_job
-from nrdf.output import output_folder
+from nrdf.output import output_file, output_folder
 from nrdf.picture import Panel, draw_regions
 from nrdf.process.job_folder import job_of, panel_of, write_transfer
 from nrdf.process.knowledge_file import write_knowledge
@@ -23,6 +23,7 @@ from nrdf.studio.bench import Bench, Result
 from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
 from nrdf.studio.teaching import knowledge_of
+from nrdf.swap import MANIFEST
 
 SAVED = "saved"
 
@@ -72,8 +73,8 @@ def save_picture(desk: Desk, bench: Bench) -> Path:
         if result is not None:
             panels.append(panel_of(result.transferred, target.object.name))
     place = place_of(desk, "picture.png")
-    place.parent.mkdir(parents=True, exist_ok=True)
-    draw_regions(panels, place)
+    with output_file(place):
+        draw_regions(panels, place)
     return place
 
 
@@ -82,7 +83,7 @@ def zipped(folder: Path) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(folder.rglob("*")):
-            if path.is_file():
+            if path.is_file() and path.name != MANIFEST:
                 archive.write(path, Path(folder.name) / path.relative_to(folder))
     return buffer.getvalue()
 

@@ -15,10 +15,17 @@ from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
 from nrdf.errors import ConfigError, ModelError, OutputError
+from nrdf.field.zoo import WEIGHTS
+from nrdf.locks import new_token
 from nrdf.ply import write_atomically
 
 FOLDER = "checkpoints"
 IDENTITY = "run.json"
+METRICS = "metrics.jsonl"
+BOARD = "tensorboard"
+COST = "cost.json"
+"""What a run's folder holds: checkpoints, what run it is, figures, those for TensorBoard, and in an
+ablation the seconds that it took."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,9 @@ def save_checkpoint(
     Raises OutputError when it cannot be written; the checkpoint before it then remains.
     """
     final = run / FOLDER / f"step-{position.total:09d}"
-    temporary = run / FOLDER / f".{final.name}.{os.getpid()}.tmp"
+    if final.exists():
+        return  # it is whole, and a run always comes to the same
+    temporary = run / FOLDER / f".{final.name}.{new_token()}.tmp"
     try:
         temporary.mkdir(parents=True)
         save_file(_plain(field.state_dict()), temporary / "field.safetensors")
@@ -54,8 +63,6 @@ def save_checkpoint(
         (temporary / "position.json").write_text(json.dumps(asdict(position)))
         for file in temporary.iterdir():
             _flush(file)
-        if final.exists():
-            shutil.rmtree(final)
         os.replace(temporary, final)
     except (OSError, SafetensorError, RuntimeError) as error:
         raise OutputError(
@@ -113,8 +120,8 @@ def open_run(run: Path, identity: dict[str, Any], overwrite: bool = False) -> bo
     """
     path = run / IDENTITY
     try:
-        if overwrite and run.exists() and (path.exists() or not any(run.iterdir())):
-            shutil.rmtree(run)
+        if overwrite and path.exists():
+            _remove_run(run)
         if path.exists():
             known = json.loads(path.read_text())["identity"]
             differing = _differences(known, json.loads(json.dumps(identity)))
@@ -132,6 +139,22 @@ def open_run(run: Path, identity: dict[str, Any], overwrite: bool = False) -> bo
     except (OSError, ValueError, KeyError) as error:
         raise OutputError(f"cannot use {run} for a training run: {error}") from None
     return False
+
+
+def _remove_run(run: Path) -> None:
+    """Remove what a training run wrote. Raises OutputError where the folder holds anything else."""
+    own = (FOLDER, BOARD, METRICS, WEIGHTS, COST, IDENTITY)
+    foreign = [p.name for p in run.iterdir() if p.name not in own and not p.name.startswith(".")]
+    if foreign:
+        raise OutputError(
+            f"{run} holds {foreign[0]}, which no training run wrote: move it away, or choose "
+            "another folder"
+        )
+    for name in own:  # IDENTITY last: whatever ends this, it is still a run
+        if (run / name).is_dir() and not (run / name).is_symlink():
+            shutil.rmtree(run / name)
+        else:
+            (run / name).unlink(missing_ok=True)
 
 
 def common_checkpoint(run: Path, identity: dict[str, Any]) -> Path:

@@ -8,7 +8,7 @@ import signal
 import threading
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from nrdf.errors import ConfigError, DataError, TrainingError, unknown_name
 from nrdf.field import build_field
 from nrdf.field.base import Field
 from nrdf.field.weights import save_weights
+from nrdf.locks import claim
 from nrdf.training.checkpoint import (
     Position,
     common_checkpoint,
@@ -68,7 +69,7 @@ def train(
     something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
     """
     out = Path(out)
-    with join_workers(device) as workers:
+    with join_workers(device) as workers, claim(out) if workers.first else nullcontext():
         entries = list_shapes([Path(folder) for folder in data])
         bank = load_bank(entries, "train", config.data, workers.device)
         if bank.categories != {category}:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import logging
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -13,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from nrdf.errors import OutputError
+from nrdf.training.checkpoint import BOARD, METRICS
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +33,7 @@ class Display:
             return
         self._run = run
         self._append("")  # fails now rather than after the first steps
-        self._board = _tensorboard(run / "tensorboard", done)
+        self._board = _tensorboard(run / BOARD, done)
         console = Console(stderr=True)
         if console.is_terminal:
             self._bar = Progress(
@@ -57,7 +60,8 @@ class Display:
         if self._bar:
             self._bar.stop()
         if self._board:
-            self._board.close()
+            with _written(self._run / BOARD):
+                self._board.close()
 
     def report(self, stage: str, step: int, values: dict[str, float]) -> None:
         """Show scalars (losses, rates, validation figures) of step `step` of all steps."""
@@ -68,8 +72,9 @@ class Display:
         left = each * (self._total - step)
         self._append(json.dumps({"step": step, "stage": stage, **values}) + "\n")
         if self._board:
-            for name, value in values.items():
-                self._board.add_scalar(name, value, step)
+            with _written(self._run / BOARD):
+                for name, value in values.items():
+                    self._board.add_scalar(name, value, step)
         numbers = "  ".join(f"{name.removeprefix('loss/')} {v:.4g}" for name, v in values.items())
         if self._bar:
             self._bar.update(self._task, completed=step, description=stage, numbers=numbers)
@@ -85,15 +90,20 @@ class Display:
             )
 
     def _append(self, text: str) -> None:
-        path = self._run / "metrics.jsonl"
-        try:
-            with path.open("a", encoding="utf-8") as file:
-                file.write(text)
-        except OSError as error:
-            raise OutputError(
-                f"cannot write {path}: {error.strerror}; free some space or allow writing, then "
-                "start the same command again: it goes on from its last checkpoint"
-            ) from None
+        path = self._run / METRICS
+        with _written(path), path.open("a", encoding="utf-8") as file:
+            file.write(text)
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(
+            f"cannot write {path}: {error.strerror}; free some space or allow writing, then "
+            "start the same command again: it goes on from its last checkpoint"
+        ) from None
 
 
 def _tensorboard(folder: Path, step: int) -> Any:
@@ -102,4 +112,5 @@ def _tensorboard(folder: Path, step: int) -> Any:
     except ImportError:
         log.info("no TensorBoard scalars; install nrdf[train] to get them")
         return None
-    return SummaryWriter(str(folder), purge_step=step + 1)
+    with _written(folder):
+        return SummaryWriter(str(folder), purge_step=step + 1)

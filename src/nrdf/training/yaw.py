@@ -24,8 +24,10 @@ from nrdf.field.weights import save_weights
 from nrdf.field.yaw import YawConfig, YawNetwork, turn
 from nrdf.field.zoo import WEIGHTS
 from nrdf.geometry import seen_from
+from nrdf.locks import claim, writing
 from nrdf.shapes.dataset import read_shape
 from nrdf.training.checkpoint import (
+    METRICS,
     Position,
     latest_checkpoint,
     load_field_state,
@@ -106,24 +108,25 @@ def train_yaw(
         "category": category,
         "shapes": [entry.path.stem for entry in kept],
     }
-    resumed = open_run(out, identity, overwrite)
-    workers = Workers(0, 1, torch.device("cpu"))
-    if not resumed:
-        write_identity(out, identity, environment(workers))
-    views, validation = load_views(kept, category), load_views(held, category)
-    network = _run(settings, config, views, out, progress)
-    scores = validate(network, validation, settings)
-    path = out / WEIGHTS
-    metadata = {
-        "category": category,
-        "train": asdict(settings),
-        "shapes": provenance(kept),
-        "scores": scores,
-        "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        **environment(workers),
-    }
-    save_weights(path, network, metadata)
-    return path
+    with claim(out):
+        resumed = open_run(out, identity, overwrite)
+        workers = Workers(0, 1, torch.device("cpu"))
+        if not resumed:
+            write_identity(out, identity, environment(workers))
+        views, validation = load_views(kept, category), load_views(held, category)
+        network = _run(settings, config, views, out, progress)
+        scores = validate(network, validation, settings)
+        path = out / WEIGHTS
+        metadata = {
+            "category": category,
+            "train": asdict(settings),
+            "shapes": provenance(kept),
+            "scores": scores,
+            "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+            **environment(workers),
+        }
+        save_weights(path, network, metadata)
+        return path
 
 
 def split(entries: Sequence[Entry]) -> tuple[list[Entry], list[Entry]]:
@@ -280,7 +283,8 @@ def _run(
         mean += (float(loss.detach()) - mean) * (0.02 if step > done else 1.0)
         if (step + 1) % CHECKPOINT_EVERY == 0 or step + 1 == settings.steps:
             save_checkpoint(out, Position(0, step + 1, step + 1), network, optimizer, None)
-            with open(out / "metrics.jsonl", "a", encoding="utf-8") as file:
+            path = out / METRICS
+            with writing(path), open(path, "a", encoding="utf-8") as file:
                 file.write(json.dumps({"step": step + 1, "loss": round(mean, 4)}) + "\n")
         if progress is not None:
             progress(step + 1, settings.steps)

@@ -1,0 +1,171 @@
+"""One run at a time writes to a place, and clears what a killed run left there.
+
+Beside a file or folder NAME lies `.NAME.lock` as long as a run writes it. The operating system
+takes the lock from a process that ends in whatever way, so a run that is alive can be told from a
+dead one, whatever their process numbers. Beside it lie as well, until they are whole,
+`.NAME.TOKEN.part` (a file), `.NAME.TOKEN.tmp` and, for a moment, `.NAME.TOKEN.old` (folders).
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import re
+import secrets
+import shutil
+import sqlite3
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from nrdf.errors import OutputError
+
+log = logging.getLogger(__name__)
+
+_TOKEN = "[0-9a-f]{8}"
+_PART = re.compile(rf"\.(.+)\.{_TOKEN}\.part")
+_ADVICE = {
+    errno.ENOSPC: "free some space or choose another place",
+    errno.EDQUOT: "free some space or choose another place",
+    errno.EFBIG: "choose a place that takes larger files",
+    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.EACCES: "allow writing there or choose another place",
+    errno.EPERM: "allow writing there or choose another place",
+    errno.EROFS: "it can only be read there: choose another place",
+}
+
+
+@contextmanager
+def claim(path: str | Path, wait: bool = False) -> Iterator[None]:
+    """No other run writes to `path`, a file or folder or neither yet, until the block ends.
+
+    Makes the parents that are missing (those that are still empty at the end go again), and
+    removes what killed runs left of `path`. Where another run is writing there, raises OutputError
+    at once; with `wait`, waits for it. Raises OutputError too where the place cannot be written.
+    """
+    from filelock import FileLock, Timeout
+
+    place = resolved(path)
+    file, made = beside(place, "lock"), _missing(home(place))
+    lock = FileLock(file)
+    try:
+        with writing(path):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                if not wait:
+                    raise OutputError(
+                        f"another run is writing to {path}: wait until it has ended, or choose "
+                        "another place"
+                    ) from None
+                log.info("waiting for another run, which is writing to %s", path)
+                lock.acquire()
+            _clear(place)
+        yield
+    finally:
+        if lock.is_locked:
+            # Before it is given back: who opened it meanwhile sees that its name is gone, and
+            # begins anew. Windows removes no open file; there, releasing removes it.
+            with suppress(OSError):
+                os.unlink(file)
+            lock.release()
+        _remove_empty(made)
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """What prevents writing `path` inside of the block is raised as OutputError."""
+    try:
+        yield
+    except (OSError, sqlite3.Error) as error:
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: str | Path, error: Exception) -> OutputError:
+    """The OutputError that says why `path` cannot be written, and what to do."""
+    code = getattr(error, "errno", None)
+    reason = getattr(error, "strerror", None) or str(error)
+    advice = _ADVICE.get(code or 0, "choose another place, or free some space")
+    return OutputError(f"cannot write {path}: {reason}; {advice}")
+
+
+def resolved(path: str | Path) -> Path:
+    """`path` with all links followed. Raises OutputError for a name that no file can have."""
+    try:
+        place = Path(os.path.realpath(path))
+        if place.is_symlink():
+            raise OSError(errno.ELOOP, "the link leads back to itself")
+        return place
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise cannot_write(str(path).replace("\0", "\\0"), error) from None
+
+
+def home(place: Path) -> Path:
+    """The folder in which the lock of `place`, and what is not whole, lie.
+
+    Its parent; itself for a folder that cannot be moved: a mount point, as containers have, or one
+    in a folder that is not ours to write.
+    """
+    parent = place.parent
+    if place.is_dir() and (os.path.ismount(place) or not os.access(parent, os.W_OK | os.X_OK)):
+        return place
+    return parent
+
+
+def beside(place: Path, ending: str) -> Path:
+    """The name beside `place`, or in it, that ends in `ending`."""
+    return home(place) / f".{place.name}.{ending}"
+
+
+def new_token() -> str:
+    """What tells names of runs apart, alike in process number and time though they be."""
+    return secrets.token_hex(4)
+
+
+def leftovers(place: Path, ending: str) -> list[Path]:
+    """Folders `.NAME.TOKEN.ending` of `place`."""
+    name = re.compile(rf"\.{re.escape(place.name)}\.{_TOKEN}\.{ending}")
+    return [path for path in _named(home(place), name) if stat.S_ISDIR(path.lstat().st_mode)]
+
+
+def _clear(place: Path) -> None:
+    """Remove what killed runs left of `place`, and files in it that are not whole. What was set
+    aside (`.old`) holds other people's files, and stays."""
+    for folder in leftovers(place, "tmp"):
+        shutil.rmtree(folder, ignore_errors=True)
+    remove_parts(home(place), place.name)
+    if place.is_dir():
+        remove_parts(place)
+
+
+def remove_parts(folder: Path, name: str | None = None) -> None:
+    """Remove the files in `folder`, those of one `name` or all, that killed runs left half-written.
+
+    Those of a name that is locked may be another run's, and stay.
+    """
+    for path in _named(folder, _PART):
+        found = _PART.fullmatch(path.name)
+        of = found[1] if found else ""
+        mine = of == name if name is not None else not (folder / f".{of}.lock").exists()
+        if mine and stat.S_ISREG(path.lstat().st_mode):
+            path.unlink()
+
+
+def _named(folder: Path, name: re.Pattern[str]) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    return sorted(path for path in folder.iterdir() if name.fullmatch(path.name))
+
+
+def _missing(folder: Path) -> list[Path]:
+    """What there is not of a folder and its parents, outermost first."""
+    return [p for p in (folder, *folder.parents) if not p.exists()][::-1]
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with suppress(OSError):  # somebody has put something there, or took it away
+        for folder in reversed(folders):
+            folder.rmdir()
