@@ -116,6 +116,29 @@ def test_a_run_is_found_again_and_another_refused(trained, tmp_path):
     assert latest_checkpoint(run) is None
 
 
+def test_starting_anew_removes_only_what_training_wrote(trained, tmp_path):
+    run = tmp_path / "run"
+    open_run(run, {"a": 1})
+    write_identity(run, {"a": 1}, {})
+    save_checkpoint(run, Position(0, 1, 1), *trained, None)
+    (run / "weights.safetensors").symlink_to(tmp_path / "theirs")
+    (tmp_path / "theirs").write_text("theirs")
+    (run / "thesis.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"holds thesis.txt, which no training run wrote"):
+        open_run(run, {"a": 2}, overwrite=True)
+    assert latest_checkpoint(run) is not None
+    (run / "thesis.txt").unlink()
+    assert open_run(run, {"a": 2}, overwrite=True) is False
+    assert list(run.iterdir()) == [] and (tmp_path / "theirs").read_text() == "theirs"
+
+
+def test_a_checkpoint_that_is_there_is_not_lost_for_another_of_the_same_step(trained, tmp_path):
+    save_checkpoint(tmp_path, Position(0, 1, 1), *trained, None)
+    before = {p: p.stat().st_ino for p in latest_checkpoint(tmp_path).iterdir()}
+    save_checkpoint(tmp_path, Position(0, 1, 1), *trained, None)
+    assert {p: p.stat().st_ino for p in latest_checkpoint(tmp_path).iterdir()} == before
+
+
 def test_a_run_cannot_be_where_a_file_is(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot use"):

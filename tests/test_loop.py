@@ -17,6 +17,7 @@ import torch
 from nrdf.errors import ConfigError, DataError, OutputError, TrainingError
 from nrdf.field import PRESETS
 from nrdf.field.weights import load_weights
+from nrdf.locks import claim
 from nrdf.training import loop
 from nrdf.training.checkpoint import latest_checkpoint
 from nrdf.training.loop import learning_rate, train
@@ -73,6 +74,15 @@ def test_training_learns_and_says_what_it_made(data, tmp_path):
     assert losses[-1] < losses[0] and lines[-1]["step"] == 150
     saved = json.loads((tmp_path / "run/run.json").read_text())
     assert saved["identity"]["config"]["preset"] == "tiny" and "commit" in saved
+
+
+def test_a_second_training_in_the_same_folder_is_refused(data, tmp_path):
+    with (
+        claim(tmp_path / "run"),
+        pytest.raises(OutputError, match=r"another run is writing to .*run"),
+    ):
+        run(data, tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_depends_on_its_seed_alone(data, tmp_path):

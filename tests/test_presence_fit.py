@@ -69,9 +69,11 @@ def test_pairs_that_were_measured_are_kept(tmp_path, monkeypatch):
     assert shown == [(1, 2), (2, 2)] and len(first) == 2 and len(again) == 3
     assert [row[1:] for row in asked] == [("chair", i, presence.FIRST_SEED) for i in range(3)]
     assert again[2].evidence[0] == 1.0 and again[2].state == "absent"
-    (tmp_path / "chair-001.json").write_text("[{")
-    with pytest.raises(DataError, match=r"chair-001\.json is damaged .* delete it"):
-        presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
+    whole = (tmp_path / "chair-001.json").read_text()
+    for damaged in ("[{", "[" * 100_000, '"x"', whole.replace('"pair": 1', '"pair": "x"'), "\0"):
+        (tmp_path / "chair-001.json").write_text(damaged)
+        with pytest.raises(DataError, match=r"chair-001\.json is damaged .* delete it"):
+            presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
 
 
 def test_pairs_whose_target_lacks_regions_come_first():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -76,6 +77,37 @@ def test_lines_that_were_cut_off_or_are_not_ours_do_not_count(benchmark, folder)
     assert len(PairStore(folder).open(benchmark, SPEC)) == 3
     (result,) = evaluate(benchmark, [SPEC], store=PairStore(folder))
     assert len(result.pairs) == 6 and len(path.read_text().splitlines()) == 6
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda line: "[" * 100_000,
+        lambda line: line.replace('"seconds": ', '"seconds": NaN, "s": '),
+        lambda line: re.sub(r'("points": \{"\w+": )\d+', r"\g<1>1e999", line),
+        lambda line: re.sub(r'("cd-l1": )[\d.e-]+', r"\g<1>NaN", line, count=1),
+        lambda line: "\x00\xff",
+    ],
+)
+def test_a_damaged_line_is_measured_again(benchmark, folder, change):
+    path = folder / "pairs" / "chair-published-copy.jsonl"
+    lines = path.read_text().splitlines()
+    damaged = change(lines[2])
+    assert damaged != lines[2]
+    path.write_text("\n".join([*lines[:2], damaged, *lines[3:], ""]), encoding="latin-1")
+    assert len(PairStore(folder).open(benchmark, SPEC)) == 5
+    (result,) = evaluate(benchmark, [SPEC], store=PairStore(folder))
+    assert len(result.pairs) == 6
+
+
+def test_a_folder_in_a_files_place_is_refused_and_halves_are_cleared(benchmark, folder):
+    (folder / "pairs" / ".x.jsonl.0123abcd.part").write_text("half")
+    store = PairStore(folder)
+    assert [p.name for p in store.folder.iterdir()] == ["chair-published-copy.jsonl"]
+    (folder / "pairs" / "chair-published-copy.jsonl").unlink()
+    (folder / "pairs" / "chair-published-copy.jsonl").mkdir()
+    with pytest.raises(OutputError, match="it is a folder"):
+        store.open(benchmark, SPEC)
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):

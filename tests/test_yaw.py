@@ -14,6 +14,7 @@ from nrdf.field import yaw as yaws
 from nrdf.field.weights import load_tensors
 from nrdf.field.yaw import YawNetwork, at_yaws, load_yaw, turn
 from nrdf.field.zoo import add_to_zoo, list_models
+from nrdf.locks import claim
 from nrdf.shapes.dataset import IndexRow, Shape, write_index, write_shape
 from nrdf.similarity import LEFT_FOR_RIGHT, about_up
 from nrdf.training import yaw as training
@@ -147,6 +148,12 @@ def test_training_goes_on_where_it_was_killed(folder, tmp_path, monkeypatch):
     assert all(torch.equal(one[name], two[name]) for name in one)
     with pytest.raises(OutputError, match=r"holds another run: its yaw\.steps is 12, not 30"):
         train_yaw("step", [folder], tmp_path / "run", YawSettings(steps=30, batch=8))
+
+
+def test_a_second_training_in_the_same_folder_is_refused(folder, tmp_path):
+    with claim(tmp_path / "run"), pytest.raises(OutputError, match="another run is writing"):
+        train_yaw("step", [folder], tmp_path / "run", FEW)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_trained_says_what_it_is_and_tells_yaw(trained):

@@ -106,13 +106,19 @@ def run(given: list[str], verbose: bool = False) -> int:
     except NrdfError as error:
         _complain(str(error))
         return error.exit_code
-    except KeyboardInterrupt:
-        _complain("interrupted" + "; the same command goes on where it was" * _resumable(given))
-        return 130
     except BrokenPipeError:
         # The reader of our output has gone (`nrdf info | head`): nothing more to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:
+        # A disk that fills up, a folder that goes away: the machine's answer, and no bug of ours.
+        logging.getLogger("nrdf").debug("where it happened", exc_info=True)
+        where = f" ({error.filename})" if error.filename else ""
+        _complain(f"the system refused: {error.strerror or error}{where}")
+        return 2
+    except KeyboardInterrupt:
+        _complain("interrupted" + "; the same command goes on where it was" * _resumable(given))
+        return 130
 
 
 def _resumable(given: list[str]) -> bool:

@@ -57,7 +57,9 @@ def output_folder(
 
 
 @contextmanager
-def output_file(path: str | Path | None, inputs: Iterable[str | Path | None] = ()) -> Iterator[None]:
+def output_file(
+    path: str | Path | None, inputs: Iterable[str | Path | None] = ()
+) -> Iterator[None]:
     """A block in which only this run writes the file `path`, whose folder is made if missing.
 
     None stands for no file.

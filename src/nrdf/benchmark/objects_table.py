@@ -14,6 +14,7 @@ import numpy as np
 
 from nrdf.benchmark.objects_match import PairFigure, PartFigure, Pose
 from nrdf.benchmark.objects_pairs import ABSENT, HIDDEN, LEAST_SHARE, THERE
+from nrdf.names import spreadsheet_text
 from nrdf.process.transfer import MIN_CONFIDENCE
 
 Pairs = Sequence[tuple[str, str]]
@@ -237,7 +238,8 @@ def to_csv(figures: Sequence[PairFigure]) -> str:
             iou, *told = ("" if value is None else f"{value:.6g}" for value in own)
             skipped = "" if part.score is None else str(is_skipped(part)).lower()
             writer.writerow([
-                figure.method, figure.views, figure.reference, figure.target, part.part,
+                figure.method, figure.views,
+                *map(spreadsheet_text, (figure.reference, figure.target, part.part)),
                 part.state, iou, part.true, part.found, part.reason, skipped, *told,
                 " ".join(f"{value:.6g}" for value in part.evidence),
                 *(f"{share:.4f}" for share in figure.mixed), pose,

@@ -12,14 +12,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 from scipy.optimize import minimize
 
 from nrdf.benchmark.scans import KINDS, RegionFigure, score_regions
-from nrdf.errors import DataError, OutputError
+from nrdf.errors import DataError
+from nrdf.files import read_file
+from nrdf.locks import writing
 from nrdf.ply import write_atomically
 from nrdf.regions.presence import ABSENT
 from nrdf.scans.judge import Judge
 from nrdf.shapes.families import get_family
+
+_ROWS = TypeAdapter(list[RegionFigure])
+_LARGEST = 1 << 26
 
 FIRST_SEED = 1_000_000
 """Of the members that are fitted on."""
@@ -52,10 +58,8 @@ def collect(
     Each pair is kept in a file of `folder`, and not measured again. Raises OutputError if it cannot
     be written, DataError for a file that is damaged.
     """
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot write to {folder}: {error.strerror or error}") from None
     figures: list[RegionFigure] = []
     ready: Judge | None = None
     for done, pair in enumerate(choose_pairs(category, pairs), 1):
@@ -138,7 +142,7 @@ def _table(figures: Sequence[RegionFigure]) -> tuple[np.ndarray, np.ndarray]:
 
 def _read(path: Path) -> list[RegionFigure]:
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-        return [RegionFigure(**{**row, "evidence": tuple(row["evidence"])}) for row in rows]
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise DataError(f"{path} is damaged ({error}); delete it and start again") from None
+        return _ROWS.validate_json(read_file(path, DataError, _LARGEST))
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]["msg"]
+        raise DataError(f"{path} is damaged ({fault}); delete it and start again") from None

@@ -21,6 +21,7 @@ from nrdf.benchmark.methods import METHODS, MethodSpec
 from nrdf.benchmark.metrics import METRICS, MISSED, chamfer_l1
 from nrdf.cloud import PointCloud
 from nrdf.errors import ConfigError, DataError, NrdfError, OutputError, unknown_name
+from nrdf.names import spreadsheet_text
 from nrdf.ply import write_atomically
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.model import Model
@@ -270,7 +271,8 @@ def write_results(
     for result in results:
         for shape in result.shapes:
             figures = f"{shape.cd_l1:.9g}", f"{shape.mse:.9g}", int(shape.is_empty)
-            writer.writerow([category, result.spec.name, shape.name, *figures])
+            names = category, result.spec.name, shape.name
+            writer.writerow([*map(spreadsheet_text, names), *figures])
     content = {
         **provenance,
         "category": category,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -15,12 +16,15 @@ from nrdf.benchmark import metrics
 from nrdf.benchmark.bsrc import Benchmark, BenchmarkObject
 from nrdf.benchmark.methods import MethodSpec
 from nrdf.errors import OutputError
+from nrdf.files import read_file
+from nrdf.locks import remove_parts, writing
 from nrdf.ply import write_atomically
 
 log = logging.getLogger(__name__)
 Key = TypeVar("Key")
 
 FOLDER = "pairs"
+_LARGEST = 1 << 30
 _PACKAGE = Path(__file__).resolve().parents[1]
 _SOURCES = (
     "benchmark/baselines.py", "benchmark/bsrc.py", "benchmark/learned.py", "benchmark/methods.py",
@@ -58,6 +62,7 @@ class LineStore:
         self.folder, self.overwrite = folder / FOLDER, overwrite
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
+            remove_parts(self.folder)
         except OSError as error:
             raise OutputError(
                 f"cannot make {self.folder}: {error.strerror or error}; choose another --out"
@@ -67,16 +72,13 @@ class LineStore:
         """What the file `name` has of the fingerprints in `marks`, by what they stand for there;
         other lines are taken out."""
         path, kept = self.folder / name, {}
-        try:
-            there = path.exists() and not self.overwrite
-            lines = path.read_text(encoding="utf-8").splitlines() if there else []
-        except (OSError, ValueError) as error:
-            raise OutputError(f"cannot read {path}: {error}; delete it to start anew") from None
-        for line in lines:
+        there = path.exists() and not self.overwrite
+        text = read_file(path, OutputError, _LARGEST) if there else b""
+        for line in text.decode("utf-8", "replace").splitlines():
             try:
                 content = json.loads(line)
                 mark = content["fingerprint"]
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 continue  # cut off, or not ours
             if isinstance(mark, str) and mark in marks:
                 kept[marks[mark]] = content
@@ -87,11 +89,8 @@ class LineStore:
     def append(self, name: str, mark: str, content: Mapping[str, Any]) -> None:
         """Add a line."""
         path = self.folder / name
-        try:
-            with open(path, "a", encoding="utf-8") as file:
-                file.write(json.dumps({"fingerprint": mark, **content}) + "\n")
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror or error}") from error
+        with writing(path), open(path, "a", encoding="utf-8") as file:
+            file.write(json.dumps({"fingerprint": mark, **content}) + "\n")
 
 
 class PairStore(LineStore):
@@ -156,11 +155,18 @@ def _parsed(content: Mapping[str, Any], rois: tuple[str, ...]) -> PairResult | N
         }
         points = {roi: int(content["points"][roi]) for roi in rois}
         names = str(content["reference"]), str(content["target"])
-        confidence = {roi: float(value) for roi, value in content["confidence"].items()}
-        return PairResult(*names, float(content["seconds"]), points, figures, confidence)
-    except (ValueError, KeyError, TypeError, AttributeError):
+        confidence = {roi: _finite(value) for roi, value in content["confidence"].items()}
+        return PairResult(*names, _finite(content["seconds"]), points, figures, confidence)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         return None
 
 
 def _number(value: Any) -> float | None:
-    return None if value is None else float(value)
+    return None if value is None else _finite(value)
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("a figure that is no number")
+    return number

@@ -19,6 +19,7 @@ from nrdf.benchmark.evaluate import MethodResult
 from nrdf.benchmark.methods import METHODS
 from nrdf.benchmark.metrics import METRICS
 from nrdf.benchmark.store import code_checksum
+from nrdf.names import spreadsheet_text
 from nrdf.ply import write_atomically
 
 PUBLISHED = {
@@ -140,7 +141,8 @@ def to_csv(results: Sequence[MethodResult], benchmark: Benchmark) -> str:
             for roi in benchmark.rois:
                 which = [benchmark.category, benchmark.labels, result.spec.name]
                 sure = f"{pair.confidence[roi]:.6g}" if pair.confidence else ""
-                which += [pair.reference, pair.target, roi, str(pair.points[roi]), sure]
+                which += map(spreadsheet_text, (pair.reference, pair.target, roi))
+                which += [str(pair.points[roi]), sure]
                 values = (pair.figures[roi][name] for name in METRICS)
                 figures = ["" if value is None else f"{value:.9g}" for value in values]
                 writer.writerow([*which, *figures, f"{pair.seconds:.4f}"])

@@ -18,6 +18,7 @@ from nrdf.commands.console import (
     table,
     versions,
 )
+from nrdf.commands.one_run import one_run_at
 
 if TYPE_CHECKING:
     from nrdf.benchmark.bsrc import Benchmark
@@ -51,6 +52,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
     }
 
 
+@one_run_at("out")
 def bsrc(
     data: Path,
     category: Literal["chair", "car", "plane"],
@@ -187,6 +189,7 @@ def families(
     )
 
 
+@one_run_at("out")
 def bench(
     preset: tuple[str, ...] = ("default", "paper"),
     device: str = "cpu",

@@ -16,8 +16,10 @@ from nrdf.commands.console import (
     table,
     versions,
 )
+from nrdf.commands.one_run import one_run_at
 
 
+@one_run_at("out")
 def objects(
     data: Path,
     out: Path | None = None,

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Literal
 
 from nrdf.bounds import Count
 from nrdf.commands.console import console, progress_bar, show, table
+from nrdf.commands.one_run import one_run_at
 
 if TYPE_CHECKING:
     from nrdf.benchmark.scans import RegionFigure
     from nrdf.scans.judge import Judge
 
 
+@one_run_at("out")
 def presence(
     out: Path,
     category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),

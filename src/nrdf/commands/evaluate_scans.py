@@ -7,8 +7,10 @@ from typing import Literal
 
 from nrdf.bounds import Count, CountFromZero
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
+from nrdf.commands.one_run import one_run_at
 
 
+@one_run_at("out")
 def scans(
     category: Literal["chair", "car", "plane"],
     model: str | None = None,

@@ -8,8 +8,10 @@ from typing import Annotated, Literal
 
 from nrdf.bounds import Count, Share, Within
 from nrdf.commands.console import command_line, console, progress_bars, versions
+from nrdf.commands.one_run import one_run_at
 
 
+@one_run_at("out")
 def shape(
     data: Path,
     method: tuple[str, ...] = ("nrdf",),

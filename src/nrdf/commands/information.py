@@ -106,9 +106,11 @@ def zoo(
         scores: name=value, lower is better; added to the scores of the training run.
         note: One line about this model.
     """
-    from nrdf.field.zoo import add_to_zoo
+    from nrdf.field.zoo import ZOO, add_to_zoo
+    from nrdf.locks import claim
 
-    entry = add_to_zoo(weights, name, _parse_scores(scores), note)
+    with claim(ZOO):
+        entry = add_to_zoo(weights, name, _parse_scores(scores), note)
     console.print(f"'{entry.name}' is in the zoo: {entry.file}, {entry.bytes / 1e6:.2f} MB")
 
 

@@ -99,6 +99,4 @@ def scan(
         write_cloud(folder / out.name, cloud, scalars={"view": seen.view, "face": seen.face})
         write_json(folder / beside.name, truth)
     of_floor = f", {truth['points_of_floor']} of them of the floor" if floor else ""
-    console.print(
-        f"{len(cloud)} points{of_floor} in {out}; the truth in {beside}"
-    )
+    console.print(f"{len(cloud)} points{of_floor} in {out}; the truth in {beside}")

@@ -9,8 +9,10 @@ from tyro.conf import Positional
 
 from nrdf.bounds import Count, Seed
 from nrdf.commands.console import console, errors, progress_bar
+from nrdf.commands.one_run import one_run_at
 
 
+@one_run_at("out")
 def synth(
     category: Positional[str],
     count: Count,
@@ -39,6 +41,7 @@ def synth(
     console.print(f"{made} shapes made, {count - made} were there already, in {out}")
 
 
+@one_run_at("out")
 def prepare(
     meshes: Positional[Path],
     category: str,
@@ -85,6 +88,7 @@ def prepare(
     return report.exit_code
 
 
+@one_run_at("out")
 def boxes(
     file: Positional[Path],
     category: str,
@@ -115,6 +119,7 @@ def boxes(
     console.print(f"{made} shapes in {out}")
 
 
+@one_run_at("data")
 def correspond(
     data: Positional[tuple[Path, ...]],
     templates: Count = 12,

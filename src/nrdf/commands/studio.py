@@ -7,8 +7,10 @@ from typing import Annotated
 
 from nrdf.bounds import Within
 from nrdf.commands.console import command_line, console, errors, versions
+from nrdf.commands.one_run import one_run_at
 
 
+@one_run_at("session")
 def studio(
     session: Path = Path("studio"),
     host: str = "127.0.0.1",

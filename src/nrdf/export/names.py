@@ -8,12 +8,8 @@ from collections.abc import Iterable
 
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options
+from nrdf.names import DEVICES
 from nrdf.process.toolpath import Job
-
-_DEVICES = frozenset(
-    ["con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(10))]
-)
-"""File names that Windows, and so many a controller, keeps for itself."""
 
 
 def plain_text(text: str) -> str:
@@ -62,7 +58,7 @@ def program_name(job: Job, options: Options, longest: int, language: str, words:
     Raises ProcessError for a name that the language or the file system keeps for itself.
     """
     name = identifier(options.program or f"nrdf_{job.category}", longest)
-    if name.lower() in _DEVICES or name.lower() in words.split():
+    if name.lower() in DEVICES or name.lower() in words.split():
         raise ProcessError(
             f"--program {name}: {language} has a use of its own for this name; give another"
         )

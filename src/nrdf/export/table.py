@@ -10,6 +10,7 @@ from nrdf.export.header import commented, header, save, tool_z_words
 from nrdf.export.names import plain_text, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
+from nrdf.names import spreadsheet_text
 from nrdf.process.toolpath import Job
 
 COLUMNS = (
@@ -33,7 +34,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(COLUMNS)
     for i, path in enumerate(job.paths, start=1):
-        names = [plain_text(text) for text in (path.region, path.process, path.tool)]
+        said = (path.region, path.process, path.tool)
+        names = [spreadsheet_text(plain_text(text)) for text in said]
         whole = [i, *names, float(path.tool_radius_m), path.spindle_rad_s]
         for k, segment in enumerate(path.segments, start=1):
             about = [k, segment.kind, segment.line, segment.feed_m_s, segment.force_n]

@@ -20,6 +20,7 @@ from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
 from nrdf.field.weights import load_weights, read_metadata
 from nrdf.files import read_file
+from nrdf.names import file_name_fault
 from nrdf.ply import write_atomically
 
 log = logging.getLogger(__name__)
@@ -141,6 +142,13 @@ def add_to_zoo(
     if metadata["preset"] == YAW:
         zoo = zoo / YAW
     name = name or str(metadata["category"])
+    fault = file_name_fault(name) or (
+        ""
+        if name.isprintable() and name == Path(name).name
+        else "it may have no separators, because it becomes a file name"
+    )
+    if fault:
+        raise ModelError(f"'{name}' is no name for a model: {fault}")
     entry = ZooEntry(
         name=name,
         file=f"{name}.safetensors",

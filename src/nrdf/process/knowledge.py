@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from nrdf.names import same_file
 from nrdf.process.quantities import (
     Angle,
     Direction,
@@ -28,7 +29,7 @@ from nrdf.process.quantities import (
     Vector,
     implausible,
 )
-from nrdf.regions.region import REGION_NAME
+from nrdf.regions.region import region_name_fault
 
 VERSION: Final = 1
 Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
@@ -45,10 +46,8 @@ _LEANING = Usual(-math.pi / 3, math.pi / 3)
 
 
 def _region_name(text: str) -> str:
-    if not REGION_NAME.fullmatch(text):
-        raise ValueError(
-            "a region's name becomes a file name: letters, digits, spaces and any of . + - _"
-        )
+    if fault := region_name_fault(text):
+        raise ValueError(f"no name for a region: {fault}")
     return text
 
 
@@ -330,4 +329,9 @@ class Knowledge(Quantities):
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"two regions are called '{twice}'; rename one")
+        if twins := same_file(names):
+            raise ValueError(
+                f"the regions '{twins[0]}' and '{twins[1]}' would be one file on Windows and "
+                "macOS; rename one"
+            )
         return self

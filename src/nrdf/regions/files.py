@@ -12,9 +12,10 @@ from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
 from nrdf.files import open_file
 from nrdf.formats.arrays import array_head, open_arrays
+from nrdf.names import same_file
 from nrdf.picture import region_colours
 from nrdf.regions.match import Match
-from nrdf.regions.region import REGION_NAME
+from nrdf.regions.region import region_name_fault
 from nrdf.units import METRES
 
 
@@ -32,12 +33,14 @@ def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np
         for name, values in read_region_file(path, unit).items():
             if name in regions:
                 raise RegionError(f"two regions are called '{name}'; rename one of the files")
-            if not REGION_NAME.fullmatch(name):
-                raise RegionError(
-                    f"'{name}' in {path} is no name for a region: letters, digits, spaces and "
-                    "any of . + - _ are allowed, because it becomes a file name"
-                )
+            if fault := region_name_fault(name):
+                raise RegionError(f"'{name}' in {path} is no name for a region: {fault}")
             regions[name] = values
+    if twins := same_file(regions):
+        raise RegionError(
+            f"the regions '{twins[0]}' and '{twins[1]}' would be one file on Windows and macOS; "
+            "rename one of the files"
+        )
     return regions
 
 

@@ -11,12 +11,26 @@ from scipy.spatial import cKDTree
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import RegionError
+from nrdf.names import file_name_fault
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""
 REGION_NAME = re.compile(r"\w[\w .+-]*")
 """What a region may be called: its name becomes a file name."""
+LONGEST_NAME = 100
 _FORMS = "a region is a boolean mask (n,), integer indices (m,) or points (m, 3) on the reference"
+
+
+def region_name_fault(name: str) -> str:
+    """Why `name` can be no region's, whose name becomes a file name; "" where it can."""
+    if not REGION_NAME.fullmatch(name):
+        return (
+            "it begins with a letter or digit, and may have letters, digits, spaces and any of "
+            ". + - _, because it becomes a file name"
+        )
+    if len(name) > LONGEST_NAME:
+        return f"it has {len(name)} characters, and at most {LONGEST_NAME} are allowed"
+    return file_name_fault(name)
 
 
 def region_indices(

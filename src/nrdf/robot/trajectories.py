@@ -10,6 +10,7 @@ import numpy as np
 from nrdf.errors import RobotError
 from nrdf.export.names import identifier
 from nrdf.locks import writing
+from nrdf.names import spreadsheet_text
 from nrdf.ply import write_atomically
 from nrdf.robot.execute import Log
 from nrdf.robot.simulate import Simulated
@@ -27,7 +28,7 @@ def rows(log: Log) -> np.ndarray:
 
 def write_csv(folder: Path, simulated: Simulated) -> None:
     """Time, what is done, turn of the object, joints (rad) and force (N), a row every 40 ms."""
-    names = ",".join(simulated.arm.joint_names)
+    names = ",".join(map(_quoted, simulated.arm.joint_names))
     lines = [f"time_s,region,process,move,line,object_turn_rad,{names},force_n"]
     clock = 0.0
     for driven in simulated.paths:
@@ -48,7 +49,8 @@ def write_csv(folder: Path, simulated: Simulated) -> None:
 
 
 def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
+    name = spreadsheet_text(name)
+    return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\r\n') else name
 
 
 def write_bag(folder: Path, simulated: Simulated) -> bool:

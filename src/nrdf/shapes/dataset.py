@@ -296,7 +296,8 @@ def make_folder(folder: str | Path) -> None:
                 entry.unlink()
     except OSError as error:
         raise OutputError(f"cannot make {folder}: {error.strerror or error}") from error
-    foreign = [e for e in entries if e.suffix not in (".npz", ".part") and e.name != INDEX]
+    visible = [e for e in entries if not e.name.startswith(".")]
+    foreign = [e for e in visible if e.suffix != ".npz" and e.name != INDEX]
     if foreign:
         raise OutputError(
             f"{folder} is no data folder: it holds {foreign[0].name}; give a new or empty folder"

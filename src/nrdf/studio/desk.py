@@ -12,8 +12,9 @@ import numpy as np
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import NrdfError, RegionError
+from nrdf.names import usable_file_name
 from nrdf.process.lesson import Lesson, overlaps
-from nrdf.regions.region import REGION_NAME
+from nrdf.regions.region import region_name_fault
 from nrdf.studio.body import REFERENCE, Body
 from nrdf.studio.colours import next_colour
 from nrdf.studio.session import Document, Painted, Session, Target
@@ -88,7 +89,7 @@ class Desk:
     def add_target(self, name: str, cloud: PointCloud) -> str:
         """Put an object, in metres, beside the others; the name that it got."""
         taken = [REFERENCE, *(t.object.name for t in self.document.targets)]
-        name = _free(PurePath(shown_name(name)).stem or "target", taken)
+        name = _free(usable_file_name(PurePath(shown_name(name)).stem, "target"), taken)
         target = Target(self.session.store(name, cloud))
         document = self.document
         self.session.change(replace(document, targets=(*document.targets, target)))
@@ -117,11 +118,8 @@ class Desk:
         new = new.strip()
         if new == old:
             return
-        if not REGION_NAME.fullmatch(new) or len(new) > 100:
-            raise RegionError(
-                f"'{new}' is no name for a region: it begins with a letter or digit, and may have "
-                "letters, digits, spaces and any of . + - _, because it becomes a file name"
-            )
+        if fault := region_name_fault(new):
+            raise RegionError(f"'{new}' is no name for a region: {fault}")
         if self.document.region(new) is not None:
             raise RegionError(f"there is a region '{new}' already; give another name")
         document = self.document.with_region(old, called=new)

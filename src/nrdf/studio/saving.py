@@ -14,6 +14,7 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.export.registry import export_job
+from nrdf.names import usable_file_name
 from nrdf.output import output_file, output_folder
 from nrdf.picture import Panel, draw_regions
 from nrdf.process.job_folder import job_of, panel_of, write_transfer
@@ -90,5 +91,5 @@ def zipped(folder: Path) -> bytes:
 
 def place_of(desk: Desk, *parts: str) -> Path:
     """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
-    # Names of targets have no separators: `Desk.add_target` sees to it.
-    return desk.session.folder.joinpath(SAVED, *parts)
+    # A session's file may have been written by somebody else, with any names.
+    return desk.session.folder.joinpath(SAVED, *(usable_file_name(p, "target") for p in parts))

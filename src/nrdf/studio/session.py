@@ -19,6 +19,7 @@ from pydantic import Field, ValidationError
 
 from nrdf.cloud import PointCloud, check_cloud, read_cloud, write_cloud
 from nrdf.errors import NrdfError, OutputError, ProcessError
+from nrdf.locks import remove_parts
 from nrdf.ply import write_atomically
 from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.strict import Strict, explain
@@ -153,6 +154,7 @@ class Session:
         for path in (self.folder / CLOUDS).glob("cloud-*.ply"):
             if path.name not in {loaded.file for loaded in objects}:
                 path.unlink(missing_ok=True)
+        remove_parts(self.folder / CLOUDS)
 
     def _go(self, taken: list[Document], kept: list[Document]) -> bool:
         if not taken:

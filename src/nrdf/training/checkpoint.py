@@ -131,7 +131,7 @@ def open_run(run: Path, identity: dict[str, Any], overwrite: bool = False) -> bo
                     "or start anew with --overwrite"
                 )
             return latest_checkpoint(run) is not None
-        if run.exists() and any(run.iterdir()):
+        if run.exists() and any(not entry.name.startswith(".") for entry in run.iterdir()):
             raise OutputError(
                 f"{run} is not empty and holds no training run; choose another folder"
             )
