@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import ValidationError
 
 from nrdf.names import file_name_fault, same_file, spreadsheet_text, usable_file_name
+from nrdf.process.knowledge import Knowledge
 from nrdf.regions.region import region_name_fault
+from nrdf.robot.trajectories import _quoted
 
 
 @pytest.mark.parametrize(
@@ -64,3 +67,26 @@ def test_formulas_become_text(text):
 @pytest.mark.parametrize("text", ["seat", "a=1", "a-b", "", "'x"])
 def test_other_texts_stay(text):
     assert spreadsheet_text(text) == text
+
+
+def test_knowledge_takes_no_names_that_some_system_cannot_tell_apart():
+    def knowledge(*names):
+        step = {"kind": "clean", "stepover_m": 0.01, "spacing_m": 0.01, "tool": {"radius_m": 0.01}}
+        step |= {"feed_m_s": 0.1, "force_n": 5}
+        rows = [{"name": name, "indices": [0, 1, 2], "processes": [step]} for name in names]
+        content = {"category": "chair", "reference": {"cloud": "x.ply"}, "regions": rows}
+        return Knowledge.model_validate(content)
+
+    assert [region.name for region in knowledge("seat", "back").regions] == ["seat", "back"]
+    with pytest.raises(ValidationError, match="'Seat' and 'seat' would be one file"):
+        knowledge("Seat", "seat")
+    with pytest.raises(ValidationError, match="Windows keeps nul for a device"):
+        knowledge("nul")
+
+
+@pytest.mark.parametrize(
+    "name, cell",
+    [("=1+1", "'=1+1"), ("=a,b", '"\'=a,b"'), ("joint_1", "joint_1"), ("a\rb", '"a\rb"')],
+)
+def test_names_in_joint_trajectories_are_text(name, cell):
+    assert _quoted(name) == cell

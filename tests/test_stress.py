@@ -273,3 +273,12 @@ def test_regions_that_would_be_one_file_are_refused(tmp_path, capsys):
         assert cli.run(words.split()) == 2
         assert message in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_a_second_studio_and_a_second_writer_of_a_data_folder_are_refused(tmp_path, capsys):
+    place = str(tmp_path / "place")
+    for words in (["studio", "--no-browser", "--session", place], ["correspond", place]):
+        with claim(place):
+            assert cli.run(words) == 2
+        assert "another run is writing to" in " ".join(capsys.readouterr().err.split())
+    assert list(tmp_path.iterdir()) == []

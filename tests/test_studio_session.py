@@ -12,6 +12,7 @@ from nrdf.process.knowledge_file import read_knowledge
 from nrdf.process.lesson import read_lesson
 from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
+from nrdf.studio.saving import place_of
 from nrdf.studio.session import FILE, Session
 from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
 from taught_box import SIZE, cloud, faces
@@ -219,3 +220,18 @@ def test_knowledge_goes_out_and_comes_back(painted, tmp_path):
     (step,), (made,) = region.steps, painted.document.regions[0].steps
     assert step.keys() == made.keys() and step["parameters"] == {"grit": 120}
     assert step["stepover_m"] == pytest.approx(made["stepover_m"])
+
+
+@pytest.mark.parametrize("name", ["...ply", "..", "/etc/..ply", "con.ply", "C:\\..\\..ply"])
+def test_no_name_of_an_upload_leads_out_of_the_sessions_folder(painted, name):
+    got = painted.add_target(name, cloud(SIZE, seed=1))
+    assert got not in ("", ".", "..") and "/" not in got and "\\" not in got
+    saved = painted.session.folder / "saved"
+    assert place_of(painted, got, "job") == saved / got / "job"
+
+
+def test_names_in_a_session_that_somebody_else_wrote_do_not_lead_out_of_its_folder(painted):
+    saved = painted.session.folder / "saved"
+    for name in ("..", "../..", "/tmp", "a/../../b"):
+        place = place_of(painted, name, "job")
+        assert place.parent.parent == saved and place.name == "job"

@@ -108,3 +108,11 @@ def test_shipped_models_are_whole():
     for entry in list_models():
         assert entry.bytes <= zoo.LARGEST
         assert load_field(entry.name)[1]["category"] == entry.category
+
+
+@pytest.mark.parametrize("name", ["../chair", "a/b", "con", "chair.", "a\nb", "x" * 300])
+def test_a_name_that_is_no_files_is_refused(stocked, untrained, name):
+    before = sorted(p.name for p in stocked.parent.rglob("*"))
+    with pytest.raises(ModelError, match="is no name for a model: "):
+        add_to_zoo(untrained, name=name, zoo=stocked)
+    assert sorted(p.name for p in stocked.parent.rglob("*")) == before
