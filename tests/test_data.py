@@ -40,7 +40,7 @@ def test_shapes_and_sizes():
     assert batch.points.shape == batch.normals.shape == (4, 64, 3)
     assert batch.queries.shape == (4, 32, 3) and batch.occupancy.shape == (4, 32)
     assert batch.source.shape == batch.target_normals.shape == (8, 32, 3)
-    assert batch.weight.shape == (8, 32) and batch.exact.shape == (8,)
+    assert batch.weight.shape == (8, 32) and batch.known.shape == (8, 32)
     assert all(value.isfinite().all() for value in tensors(batch) if value.is_floating_point())
 
 
@@ -72,7 +72,7 @@ def test_correspondences_are_true_without_deformation():
     found = bank(shapes, augment=AugmentConfig())
     chosen, _ = found.draw_shapes(4, 0, 0, 0, 1)
     batch = found.batch(4, 0, 0)
-    assert (batch.weight == 1).all() and batch.exact.all()
+    assert (batch.weight == 1).all() and batch.known.all()
     for pair in range(len(batch.reference)):
         a = shapes[chosen[batch.reference[pair]]]
         b = shapes[chosen[batch.partner[pair]]]
@@ -131,7 +131,7 @@ def test_what_the_target_lacks_has_weight_zero_in_exact_groups():
             if names[1] == "lacking":
                 none += int((batch.weight[pair] == 0).sum())
                 some += int((batch.weight[pair] > 0).sum())
-                assert batch.exact[pair]
+                assert batch.known[pair].all()
             else:
                 # A source that lacks places has none to ask about.
                 assert (batch.weight[pair] == 1).all()
@@ -141,16 +141,16 @@ def test_what_the_target_lacks_has_weight_zero_in_exact_groups():
 def test_doubtful_correspondences_are_not_drawn_and_do_not_pass_for_none():
     shapes = [Ball(f"b{i}", groups=("template-00",), missing=i == 0) for i in range(4)]
     batch = bank(shapes).batch(4, 0, 0)
-    assert (batch.weight > 0).all() and not batch.exact.any()
+    assert (batch.weight > 0).all() and not batch.known.any()
 
 
 def test_pairs_without_a_common_group_have_no_weight():
     shapes = [Ball(f"b{i}", groups=(f"template-{i // 2}",)) for i in range(4)]
     batch = bank(shapes, rolls=3).batch(4, 0, 0)
     joined = (batch.weight > 0).any(dim=1)
-    assert joined.sum() == 4 and not joined.all() and not batch.exact.any()
+    assert joined.sum() == 4 and not joined.all() and not batch.known.any()
     bare = bank([Ball(f"b{i}", groups=()) for i in range(4)]).batch(4, 0, 0)
-    assert (bare.weight == 0).all() and not bare.exact.any() and bare.source.isfinite().all()
+    assert (bare.weight == 0).all() and not bare.known.any() and bare.source.isfinite().all()
 
 
 def test_pools_share_a_batch_and_pair_within_themselves():

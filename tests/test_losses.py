@@ -97,10 +97,12 @@ def test_normal_is_one_minus_the_cosine():
     assert float(value) == pytest.approx(1.0)
 
 
-def test_existence_listens_to_exact_pairs_only():
+def test_existence_listens_to_what_is_known_only():
     found = Inverse(torch.zeros(2, 2, 3), existence=torch.tensor([[2.0, -2.0], [9.0, 9.0]]))
     weight = torch.tensor([[1.0, 0.0], [0.0, 0.0]])
-    value = losses.existence(pair(found, weight=weight, exact=torch.tensor([True, False])))
+    value = losses.existence(
+        pair(found, weight=weight, known=torch.tensor([[True, True], [False, False]]))
+    )
     assert float(value) == pytest.approx(math.log(1 + math.exp(-2)), rel=1e-5)
 
 

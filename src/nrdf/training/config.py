@@ -39,6 +39,10 @@ class AugmentConfig(Strict):
     view_frame: float = Field(default=0.0, ge=0)
     """Standard deviation of the frame's error (centre in canonical lengths, logarithm of the scale)
     of shapes that are seen in part: their frame comes from an alignment, not from their box."""
+    cut: float = Field(default=0.0, ge=0, le=1)
+    """Probability that a shape lacks one of its ends, mostly what is above a random height: a
+    chair becomes a stool. Its bounding box is that of the rest, and what is cut off does not exist.
+    """
 
 
 class DataConfig(Strict):

@@ -21,6 +21,7 @@ from nrdf.errors import ConfigError, DataError
 from nrdf.shapes.dataset import Shape, read_shape
 from nrdf.training.augment import draw_deformation, draw_sample, sensor_noise
 from nrdf.training.config import AugmentConfig, DataConfig
+from nrdf.training.cuts import Cuts, draw_cuts
 from nrdf.training.pools import find_pools, pairs
 from nrdf.training.provenance import Entry
 from nrdf.training.views import draw_views, view_bits, visible_extremes
@@ -51,7 +52,7 @@ class Batch:
     target: Tensor  # (p, m, 3) the same places on the partner
     target_normals: Tensor  # (p, m, 3)
     weight: Tensor  # (p, m) confidence; 0: no such place on the partner, or not known
-    exact: Tensor  # (p,) bool: weight 0 means that there is no such place
+    known: Tensor  # (p, m) bool: the weight tells whether there is such a place on the partner
 
 
 def seeded(device: torch.device, *keys: int) -> torch.Generator:
@@ -231,11 +232,17 @@ class Bank:
             mirror = torch.where(coin < 0.5, -mirror, mirror)
         deform = draw_deformation(config.augment, surface, mirror[pool_of], generator)
 
-        visible, extremes = None, self.extremes[chosen]
+        visible, extremes, cuts = None, self.extremes[chosen], None
+        if config.augment.cut > 0:
+            cuts = draw_cuts(surface, config.augment.cut, generator)
+            visible = cuts.keep(surface)
+            deform = deform.recanonicalised(cuts.kept(surface))
         if self.view_bits is not None:
-            visible = draw_views(self.view_bits[chosen], config.augment.views, generator)
+            seen = draw_views(self.view_bits[chosen], config.augment.views, generator)
+            deform = deform.misframed(config.augment.view_frame, ~seen.all(1), generator)
+            visible = seen if visible is None else _both(seen, visible)
+        if visible is not None:
             extremes = visible_extremes(surface, visible)
-            deform = deform.misframed(config.augment.view_frame, ~visible.all(1), generator)
         count = min(config.encoder_points, surface.shape[1])
         sample = draw_sample(config.augment, surface, count, generator, visible)
         if count > 6:  # as at inference: the embedding must know the bounding box exactly
@@ -251,11 +258,17 @@ class Bank:
             generator=generator,
             device=self.device,
         )
-        queries = deform.points(self.queries[chosen[:, None], pick])
+        places = self.queries[chosen[:, None], pick]
+        queries = deform.points(places)
         occupancy = self.occupancies[chosen[:, None], pick].float()
+        if cuts is not None:
+            occupancy = occupancy * cuts.keep(places)
 
-        a, b, weight, exact = self._draw_correspondences(
-            chosen[reference], chosen[partner], generator
+        a, b, weight, known = self._draw_correspondences(
+            chosen[reference],
+            chosen[partner],
+            generator,
+            None if cuts is None else (cuts.select(reference), cuts.select(partner)),
         )
         on_a, on_b = deform.select(reference), deform.select(partner)
         return Batch(
@@ -272,24 +285,29 @@ class Bank:
             target=on_b.points(self.group_points[b]),
             target_normals=on_b.normals(self.group_points[b], self.group_normals[b]),
             weight=weight,
-            exact=exact,
+            known=known,
         )
 
     def _draw_correspondences(
-        self, first: Tensor, second: Tensor, generator: torch.Generator
+        self,
+        first: Tensor,
+        second: Tensor,
+        generator: torch.Generator,
+        cuts: tuple[Cuts, Cuts] | None = None,
     ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Rows (p, m) into the long list on shapes first (p,) and second (p,), weights (p, m), and
-        whether the group is exact (p,). A pair that shares no group has weight 0 throughout.
+        whether the weight tells if there is such a place, (p, m). A pair that shares no group has
+        weight 0 throughout. cuts: of the first and the second shapes.
         """
         pairs, wanted = len(first), self.config.correspondences
         offset_a, offset_b = self.group_offset[first], self.group_offset[second]  # (p, g)
         shared = (offset_a >= 0) & (offset_b >= 0)
         luck = torch.rand(shared.shape, generator=generator, device=self.device)
         score, group = torch.where(shared, luck, -1.0).max(dim=1)
-        joined = score >= 0
+        joined = (score >= 0)[:, None]
         offset_a = offset_a.gather(1, group[:, None]).clamp_min(0)
         offset_b = offset_b.gather(1, group[:, None]).clamp_min(0)
-        exact = self.group_exact[group] & joined
+        exact = self.group_exact[group][:, None] & joined
 
         luck = torch.rand(
             pairs, max(1, wanted * CANDIDATES), generator=generator, device=self.device
@@ -297,18 +315,31 @@ class Bank:
         index = (luck * self.group_size[group][:, None]).long()
         # Rounding can reach the end of the list.
         index = torch.minimum(index, self.group_size[group][:, None] - 1)
-        index = torch.where(joined[:, None], index, 0)
-        on_source = self.group_weight[offset_a + index]
-        weight = on_source * self.group_weight[offset_b + index]
+        index = torch.where(joined, index, 0)
+        a, b = offset_a + index, offset_b + index
         threshold = self.config.weight_threshold
-        # An exact group's places that the source has and the target lacks teach `existence`.
-        useful = (weight > threshold) | (exact[:, None] & (on_source > threshold))
-        weight = torch.where((weight > threshold) & joined[:, None], weight, 0.0)
-        kept = useful.to(torch.uint8).sort(dim=1, descending=True, stable=True).indices[:, :wanted]
-        # What is not useful but needed to fill up must not pass for "no such place".
-        weight, index = weight.gather(1, kept), index.gather(1, kept)
-        exact = exact & useful.gather(1, kept).all(dim=1)
-        return offset_a + index, offset_b + index, weight, exact
+        on_source, on_target = self.group_weight[a], self.group_weight[b]
+        lost = torch.zeros_like(joined)
+        if cuts is not None:
+            on_source = on_source * cuts[0].keep(self.group_points[a])
+            kept = cuts[1].keep(self.group_points[b])
+            lost = ~kept & (on_target > threshold)
+            on_target = on_target * kept
+        weight = torch.where(joined, on_source * on_target, 0.0)
+        weight = torch.where(weight > threshold, weight, 0.0)
+        # Places that the source has and the target lacks teach `existence`, where that is sure.
+        lacking = (exact | lost) & (on_source > threshold) & (weight == 0) & joined
+        useful = (weight > 0) | lacking
+        order = useful.to(torch.uint8).sort(dim=1, descending=True, stable=True).indices[:, :wanted]
+        # Without cuts only exact groups say of their places that they exist.
+        known = lacking | ((weight > 0) & (exact if cuts is None else joined))
+        return tuple(values.gather(1, order) for values in (a, b, weight, known))  # type: ignore
+
+
+def _both(seen: Tensor, kept: Tensor) -> Tensor:
+    """What is seen of what is kept, (b, n) bool; all that is kept where that is nothing."""
+    both = seen & kept
+    return both | (kept & ~both.any(1, keepdim=True))
 
 
 def _draw(rng: np.random.Generator, available: int, wanted: int, name: str) -> np.ndarray:

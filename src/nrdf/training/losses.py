@@ -203,15 +203,16 @@ def normal(f: Forward) -> Tensor:
 
 
 def existence(f: Forward) -> Tensor:
-    """−[e log ê + (1 − e) log(1 − ê)] over the pairs with exact truth, e = 1 where the target has
-    the place at all (not in the paper). Zero for a field that predicts no existence."""
+    """−[e log ê + (1 − e) log(1 − ê)] over the places of which it is known whether the target has
+    them at all, e = 1 where it has (not in the paper). Zero for a field that predicts no
+    existence."""
     if f.match.existence is None:
         return f.z.new_zeros(())
     truth = (f.batch.weight > 0).float()
     each = functional.binary_cross_entropy_with_logits(
         f.match.existence.float(), truth, reduction="none"
     )
-    return weighted_mean(each, f.batch.exact[:, None].float().expand_as(each))
+    return weighted_mean(each, f.batch.known.float())
 
 
 def error_scale(f: Forward) -> Tensor:
