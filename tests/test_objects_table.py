@@ -72,7 +72,7 @@ def test_sets_and_views_have_rows_of_their_own():
 
 def test_skipped_is_what_a_transfer_leaves_out():
     assert is_skipped(part("a", reason="absent", score=0.0))
-    assert is_skipped(part("a", score=0.19)) and not is_skipped(part("a", score=0.2))
+    assert is_skipped(part("a", score=0.24)) and not is_skipped(part("a", score=0.25))
 
 
 def test_the_interval_is_of_targets_drawn_anew():

@@ -1,54 +1,83 @@
-"""Regions that are absent, were not observed, or are there."""
+"""How far regions can be believed: found, doubtful, absent, or not observed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from nrdf.regions.presence import ABSENT, NOT_OBSERVED, find_presence
+from nrdf.regions.match import Match
+from nrdf.regions.presence import (
+    ABSENT,
+    NOT_OBSERVED,
+    SURELY_ABSENT,
+    Evidence,
+    evidence_of,
+    find_presence,
+)
+
+NEAR = np.full(40, 0.02)
 
 
-def ask(exists=0.95, distance=0.03, count=40):
-    return find_presence(np.full(count, exists), np.full(count, distance))
+def ask(distance=NEAR, exists=0.95, trust=0.8, size=0.9, returned=0.9):
+    exists = np.full(len(distance), exists)
+    evidence = evidence_of(exists, trust, size, returned)
+    return find_presence(evidence, distance)
 
 
-def test_what_the_field_is_sure_of_is_there():
+def test_where_all_agrees_the_region_is_there():
     found = ask()
-    assert found.reason == "" and found.confidence > 0.9 and found.observed == 1
+    assert found.reason == "" and found.confidence == found.overlap > 0.6 and found.observed == 1
 
 
-def test_what_the_field_doubts_is_absent_wherever_it_was_mapped():
-    for distance in (0.01, 0.3):
-        found = ask(exists=0.1, distance=distance)
-        assert found.reason == ABSENT and found.confidence > 0.9
+def test_where_nothing_agrees_it_is_absent():
+    found = ask(np.full(40, 0.3), exists=0.05, trust=0.05, size=0.01, returned=0.0)
+    assert found.reason == ABSENT
+    assert found.overlap < SURELY_ABSENT and found.confidence == 1 - found.overlap
+
+
+def test_one_doubt_alone_does_not_empty_a_region():
+    for doubt in (
+        {"exists": 0.02}, {"trust": 0.1}, {"size": 0.05}, {"returned": 0.0},
+    ):  # fmt: skip
+        found = ask(**doubt)
+        assert found.reason == "" and 0.0 < found.overlap <= ask().overlap
 
 
 def test_where_no_points_are_it_was_not_observed():
-    found = ask(exists=0.99, distance=0.2)
-    assert found.reason == NOT_OBSERVED and found.observed == 0 and 0.5 < found.confidence <= 1
-    some = np.where(np.arange(40) < 10, 0.02, 0.5)
-    part = find_presence(np.full(40, 0.95), some)
+    found = ask(np.full(40, 0.2))
+    assert found.reason == NOT_OBSERVED and found.observed == 0 and found.confidence == 1
+    part = ask(np.where(np.arange(40) < 10, 0.02, 0.5))
     assert part.reason == "" and part.observed == 0.25
 
 
-def test_a_few_mapped_points_on_the_surface_are_enough_to_be_there():
-    near = np.where(np.arange(40) < 9, 0.02, 0.5)
-    few = np.where(np.arange(40) < 7, 0.02, 0.5)
-    assert find_presence(np.full(40, 0.7), near).reason == ""
-    assert find_presence(np.full(40, 0.7), few).reason == ABSENT
-
-
 @pytest.mark.parametrize(
-    ("worse", "values"), [("exists", (0.9, 0.5, 0.1)), ("distance", (0.01, 0.03, 0.07))]
+    ("evidence", "values"),
+    [
+        ("exists", (0.1, 0.5, 0.9)),
+        ("trust", (0.2, 0.5, 0.9)),
+        ("size", (0.1, 0.4, 1.0)),
+        ("returned", (0.1, 0.5, 0.9)),
+    ],
 )
-def test_each_kind_of_evidence_counts(worse, values):
-    def absent(value):
-        found = ask(**{worse: value})
-        return found.confidence if found.reason == ABSENT else 1 - found.confidence
-
-    chances = [absent(value) for value in values]
-    assert chances == sorted(chances) and chances[0] < chances[-1]
+def test_each_kind_of_evidence_counts(evidence, values):
+    overlaps = [ask(**{evidence: value}).overlap for value in values]
+    assert overlaps == sorted(overlaps) and overlaps[0] < overlaps[-1]
 
 
-def test_a_field_that_says_nothing_of_existence_finds_what_it_maps_onto_the_target():
-    assert ask(exists=1.0, distance=0.07).reason == ""
+def test_evidence_stays_finite():
+    none = evidence_of(np.zeros(5), 0.0, 0.0, 0.0)
+    sure = evidence_of(np.ones(5), 1.0, 7.0, 1.0)
+    assert np.isfinite([none, sure]).all()
+    assert none.existence == pytest.approx(-sure.existence) and none.existence < 0
+    assert sure.size == 0 > none.size
+
+
+def test_a_match_has_the_confidence_that_its_presence_allows():
+    match = Match(np.arange(4), np.zeros((9, 3)), np.array([0.4, 0.6, 0.6, 0.8]), "mask")
+    doubtful = find_presence(Evidence(0.0, -1.0, -1.0, -1.0), NEAR)
+    kept = match.with_presence(doubtful)
+    assert len(kept.indices) == 4 and kept.score == pytest.approx(doubtful.overlap)
+    assert np.allclose(kept.confidence / kept.score, match.confidence / match.score)
+    gone = find_presence(Evidence(-3.9, -3.9, -3.9, -3.9), NEAR)
+    assert gone.reason == ABSENT and len(match.with_presence(gone).indices) == 0
+    assert len(match.with_presence(gone, drop_absent=False).indices) == 4

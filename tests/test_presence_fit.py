@@ -1,4 +1,4 @@
-"""How absence is fitted: what is told apart, what cannot be, and what was measured already."""
+"""How the overlap that is to be expected is fitted, and judged on what it was not fitted to."""
 
 from __future__ import annotations
 
@@ -8,72 +8,75 @@ import numpy as np
 import pytest
 
 from nrdf.benchmark import presence
-from nrdf.benchmark.scans import RegionFigure
+from nrdf.benchmark.presence import Example
 from nrdf.errors import DataError
-from nrdf.regions.presence import ABSENT
 
 
-def region(pair: int, state: str, evidence: tuple[float, float], kind: str = "3 views"):
-    return RegionFigure(kind, pair, "arm", state, "", 0, 0.1, evidence)
-
-
-def regions(count: int = 60) -> list[RegionFigure]:
-    """Absent ones with existence about -4, the others about 2; distance says nothing."""
+def examples(count: int = 120) -> list[Example]:
+    """Overlap goes with the second evidence alone; where that is low, the part is absent."""
     rng = np.random.default_rng(0)
     found = []
     for number in range(count):
-        state = ("absent", "there", "there", "hidden")[number % 4]
-        middle = -4 if state == "absent" else 2
-        found.append(region(number // 4, state, (middle + rng.normal(), rng.normal())))
+        trust = rng.uniform(-4, 4)
+        overlap = 0.0 if trust < -1 else float(1 / (1 + np.exp(-trust)))
+        evidence = (rng.normal(), trust, -rng.random(), rng.normal())
+        names = f"chair/a_{number % 7}", f"stool/b{number % 11}"
+        found.append(Example("objects", "whole", *names, "arm", overlap, trust < -1, evidence))
     return found
 
 
-def test_what_separates_gets_the_weight():
-    rule = presence.fit(regions())
-    assert rule.weights[0] < -0.5 and abs(rule.weights[1]) < 0.5 * abs(rule.weights[0])
-    evidence = np.array([(-5.0, 0.0), (3.0, 0.0)])
-    assert rule.absent(evidence).tolist() == [True, False]
+def test_what_tells_gets_the_weight():
+    rule = presence.fit(examples())
+    others = np.abs(np.delete(rule.weights, 1))
+    assert rule.weights[1] > 0.5 and others.max() < 0.3 * rule.weights[1]
+    low, high = rule.overlap(np.array([(0, -4, -0.5, 0), (0, 4, -0.5, 0)]))
+    assert low < 0.1 and high > 0.8
 
 
-def test_canonical_clouds_do_not_count():
-    misleading = [region(0, "absent", (9.0, 0.0), "canonical") for _ in range(200)]
-    assert presence.fit(regions() + misleading).weights == presence.fit(regions()).weights
+def test_every_source_counts_alike():
+    many = [replace(e, source="family chair") for e in examples(40)]
+    once, often = presence.fit(examples() + many), presence.fit(examples() + 9 * many)
+    assert np.allclose(once.weights, often.weights, atol=1e-3)
 
 
-def test_rules_are_judged_on_pairs_that_they_were_not_fitted_on():
-    figures = regions()
-    figures[0] = replace(figures[0], reason=ABSENT)
-    rows = {row[:2]: row[2:] for row in presence.cross_validate(figures)}
-    assert rows["3 views", "absent"] == (1, 15, 15)
-    assert rows["3 views", "there"] == (0, 0, 30)
-    assert rows["full", "absent"] == (0, 0, 0)
+def test_a_product_and_its_series_are_not_fitted_on_where_it_is_judged(monkeypatch):
+    every, asked = examples(60), []
+    honest = presence.fit
+
+    def fit(chosen):
+        asked.append({presence._series(n) for e in chosen for n in (e.reference, e.target)})
+        return honest(chosen)
+
+    monkeypatch.setattr(presence, "fit", fit)
+    overlap = presence.cross_validate(every)
+    assert presence._series("chair/mammut_1") == presence._series("stool/mammut_2") == "mammut"
+    assert len(asked) == 11 and all(len(names) == 11 for names in asked)
+    rows = {row[2]: row for row in presence.summary(every, overlap)}
+    assert rows["absent"][5] == rows["absent"][3] and rows["there"][4] == 0
+    assert rows["there"][6] == pytest.approx(rows["there"][7], abs=0.15)
 
 
-def test_without_absent_regions_there_is_nothing_to_fit():
-    with pytest.raises(DataError, match="0 absent regions among 2: both kinds are needed"):
-        presence.fit([region(0, "there", (2.0, 0.0)), region(1, "there", (1.0, 0.0))])
+def test_without_absent_parts_there_is_nothing_to_fit():
+    there = [e for e in examples() if not e.absent]
+    with pytest.raises(DataError, match=f"0 absent regions among {len(there)}: both kinds"):
+        presence.fit(there)
 
 
-def test_pairs_that_were_measured_are_kept(tmp_path, monkeypatch):
+def test_what_was_measured_is_kept(tmp_path):
     asked = []
 
-    def score(judge, category, pair, first_seed):
-        asked.append((judge, category, pair, first_seed))
-        return [region(pair, "absent", (1.0, float("nan")))]
+    def collect():
+        asked.append(1)
+        return examples(3)
 
-    monkeypatch.setattr(presence, "score_regions", score)
-    monkeypatch.setattr(presence, "choose_pairs", lambda category, count: list(range(count)))
-    shown = []
-    first = presence.collect(lambda: "judge", "chair", 2, tmp_path, lambda *n: shown.append(n))
-    again = presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
-    assert shown == [(1, 2), (2, 2)] and len(first) == 2 and len(again) == 3
-    assert [row[1:] for row in asked] == [("chair", i, presence.FIRST_SEED) for i in range(3)]
-    assert again[2].evidence[0] == 1.0 and again[2].state == "absent"
-    whole = (tmp_path / "chair-001.json").read_text()
-    for damaged in ("[{", "[" * 100_000, '"x"', whole.replace('"pair": 1', '"pair": "x"'), "\0"):
-        (tmp_path / "chair-001.json").write_text(damaged)
-        with pytest.raises(DataError, match=r"chair-001\.json is damaged .* delete it"):
-            presence.collect(lambda: None, "chair", 3, tmp_path, lambda *n: None)
+    folder = tmp_path / "new"
+    assert presence.kept(folder, "pair", collect) == examples(3)
+    assert presence.kept(folder, "pair", collect) == examples(3) and asked == [1]
+    whole = (folder / "pair.json").read_text()
+    for damaged in ("[{", "[" * 100_000, '"x"', whole.replace('"absent": ', '"absent": 7'), "\0"):
+        (folder / "pair.json").write_text(damaged)
+        with pytest.raises(DataError, match=r"pair\.json is damaged .* delete it"):
+            presence.kept(folder, "pair", collect)
 
 
 def test_pairs_whose_target_lacks_regions_come_first():

@@ -49,7 +49,9 @@ def test_truth_is_there_absent_or_hidden():
     points = np.random.default_rng(0).random((1000, 3))
     labels = np.array(["seat"] * 400 + [""] * 400 + ["floor"] * 200)
     share = {"seat": 0.5, "arm": 0.0, "back": 0.2, "leg": 0.02}
-    nothing = Match(np.empty(0, int), points[:1], np.empty(0), "mask", Presence(ABSENT, 0.9, 0.0))
+    nothing = Match(
+        np.empty(0, int), points[:1], np.empty(0), "mask", Presence(ABSENT, 0.9, 0.1, 0.0)
+    )
     found = Match(np.arange(400), points[:1], np.ones(400), "mask")
     matches = {"seat": found, "arm": nothing, "back": nothing, "leg": nothing}
     figures = {f.region: f for f in scans._compare("1 view", 3, matches, points, labels, share)}

@@ -173,7 +173,7 @@ class Finder:
                     score=matches[name].score,
                     confidence=judged.confidence,
                     observed=judged.observed,
-                    evidence=tuple(judged.evidence),
+                    evidence=tuple(judged.evidence or ()),
                 )
             parts.append(figure)
         mixed = self.truth(reference).mixed, truth.mixed

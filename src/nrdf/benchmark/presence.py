@@ -1,81 +1,141 @@
-"""How absence is told from evidence: the logistic regression behind `nrdf.regions.presence`.
+"""How the overlap that is to be expected of a region is told from evidence: the regression behind
+`nrdf.regions.presence`.
 
-Fitted on pairs of family members that neither the benchmark of scans nor training has, whole and
-in simulated scans, where it is known which regions a target lacks.
+Fitted on parts of labelled real objects, and on regions of pairs of family members that neither the
+benchmark of scans nor training has; whole, and in simulated scans.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.optimize import minimize
 
-from nrdf.benchmark.scans import KINDS, RegionFigure, score_regions
+from nrdf.benchmark.objects_match import WHOLE, Finder
+from nrdf.benchmark.objects_pairs import ABSENT, THERE, part_iou, state_of
+from nrdf.benchmark.scans import score_regions
 from nrdf.errors import DataError
 from nrdf.files import read_file
 from nrdf.locks import writing
 from nrdf.ply import write_atomically
-from nrdf.regions.presence import ABSENT
+from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.regions.presence import SURELY_ABSENT, Evidence
 from nrdf.scans.judge import Judge
 from nrdf.shapes.families import get_family
 
-_ROWS = TypeAdapter(list[RegionFigure])
-_LARGEST = 1 << 26
-
 FIRST_SEED = 1_000_000
-"""Of the members that are fitted on."""
+"""Of the family members that are fitted on."""
+VIEWS = (WHOLE, 3, 1)
+FITTED = ("whole", "full", "canonical", "3 views")
+"""Kinds that are fitted on: what a single view hides would make all regions look doubtful."""
+OBJECT_STEP = 3
+"""One in so many pairs of labelled objects is taken."""
 _CHOICE = 5
-_FOLDS = 5
-_RIDGE = 1e-2  # keeps the regression finite where the evidence separates all
+_RIDGE = 1.0  # keeps the weights of evidence that says the same from growing against each other
+_ABSENT_WEIGHT = 4.0  # to call a part found that is not there is worse than to doubt one that is
+
+
+@dataclass(frozen=True)
+class Example:
+    """One region on one target. source: where it is from, such as "ikea" or "family chair"; kind:
+    how the target was seen; target: product or pair, which is in one fold as a whole, and so is
+    reference; overlap: intersection over union of what was found and the true region, 0 where
+    the target lacks it; absent: whether it does."""
+
+    source: str
+    kind: str
+    reference: str
+    target: str
+    region: str
+    overlap: float
+    absent: bool
+    evidence: tuple[float, ...]
+
+
+_ROWS = TypeAdapter(list[Example])
+_LARGEST = 1 << 26  # bytes of a file of examples
 
 
 @dataclass(frozen=True)
 class Rule:
-    """Absent where bias + weights @ evidence > 0."""
+    """Overlap to be expected of evidence: 1 / (1 + exp(-(bias + weights @ evidence)))."""
 
     bias: float
     weights: tuple[float, ...]
 
-    def absent(self, evidence: np.ndarray) -> np.ndarray:
-        """(n,) bool for evidence (n, e)."""
-        return self.bias + evidence @ np.array(self.weights) > 0
+    def overlap(self, evidence: np.ndarray) -> np.ndarray:
+        """(n,) in [0, 1] for evidence (n, e)."""
+        return np.asarray(1 / (1 + np.exp(-self.bias - evidence @ np.array(self.weights))))
 
 
-def collect(
-    judge: Callable[[], Judge],
-    category: str,
-    pairs: int,
-    folder: Path,
-    progress: Callable[[int, int], None],
-) -> list[RegionFigure]:
-    """Every region of `pairs` pairs of members, in every kind of scan (`choose_pairs`).
+def examples_of_objects(
+    finder: Finder, reference: str, target: str, views: Sequence[int] = VIEWS
+) -> list[Example]:
+    """Every part of one labelled object, sought on another, whole and in scans."""
+    regions, cloud = finder.regions(reference), finder.whole(reference).cloud
+    taught, found = finder.model.set_reference(cloud), []
+    for number in views:
+        seen, truth = finder.seen(target, number), finder.truth(target)
+        for name, match in taught.retrieve_all(regions, seen.embedded, drop_absent=False).items():
+            state = state_of(name, truth, seen.labelled)
+            if state not in (THERE, ABSENT):
+                continue
+            indices = match.indices
+            if seen.aligned is not None:
+                indices = seen.aligned.cleaned.kept[indices]
+            overlap = 0.0
+            if state == THERE:
+                overlap = part_iou(indices, name, finder.labels, seen.labelled)
+            kind = {WHOLE: "whole", 1: "1 view"}.get(number, f"{number} views")
+            evidence = match.presence.evidence or ()
+            found.append(
+                Example(
+                    "objects", kind, reference, target, name, overlap, state == ABSENT, evidence
+                )
+            )
+    return found
 
-    Each pair is kept in a file of `folder`, and not measured again. Raises OutputError if it cannot
-    be written, DataError for a file that is damaged.
+
+def examples_of_members(judge: Judge, pair: int) -> list[Example]:
+    """Every region of one family member, sought on another, whole and in scans."""
+    category = judge.model.category
+    figures = score_regions(judge, category, pair, FIRST_SEED, drop_absent=False)
+    names = f"{category} {2 * pair}", f"{category} {2 * pair + 1}"
+    return [
+        Example(
+            f"family {category}", f.kind, *names, f.region, 0.0 if f.state == "absent" else f.iou,
+            f.state == "absent", f.evidence,
+        )
+        for f in figures
+        if f.state in ("there", "absent") and f.evidence
+    ]  # fmt: skip
+
+
+def kept(folder: Path, name: str, collect: Callable[[], list[Example]]) -> list[Example]:
+    """What `collect` gives, kept in the file `name`.json of a folder, and not measured again.
+
+    Raises OutputError if it cannot be written, DataError for a file that is damaged.
     """
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    figures: list[RegionFigure] = []
-    ready: Judge | None = None
-    for done, pair in enumerate(choose_pairs(category, pairs), 1):
-        path = folder / f"{category}-{pair:03d}.json"
-        if not path.is_file():
-            ready = ready or judge()
-            found = [vars(f) for f in score_regions(ready, category, pair, FIRST_SEED)]
-            write_atomically(path, [json.dumps(found).encode()])
-        figures += _read(path)
-        progress(done, pairs)
-    return figures
+    path = folder / f"{name}.json"
+    if not path.is_file():
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, [json.dumps([asdict(e) for e in collect()]).encode()])
+    try:
+        return _ROWS.validate_json(read_file(path, DataError, _LARGEST))
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]["msg"]
+        raise DataError(f"{path} is damaged ({fault}); delete it and start again") from None
 
 
 def choose_pairs(category: str, count: int) -> list[int]:
-    """Numbers of pairs to measure: of five times as many, those first whose target lacks most of
-    the regions that its reference has."""
+    """Numbers of pairs of family members to measure: of five times as many, those first whose
+    target lacks most of the regions that its reference has."""
     family = get_family(category)
     lacks = []
     for pair in range(_CHOICE * count):
@@ -90,59 +150,80 @@ def choose_pairs(category: str, count: int) -> list[int]:
     return sorted(np.argsort(-np.array(lacks), kind="stable")[:count].tolist())
 
 
-def fit(figures: Sequence[RegionFigure]) -> Rule:
-    """The rule that tells absent regions from those that are there and seen, or hidden.
+def fit(examples: Sequence[Example]) -> Rule:
+    """The rule whose expected overlaps are likeliest, each source and kind counting alike.
 
-    Raises DataError where there are none of either.
+    Raises DataError where no part is absent, or none is there.
     """
-    evidence, absent = _table(figures)
+    examples = [e for e in examples if e.kind in FITTED]
+    evidence, overlap, absent = _table(examples)
     if absent.all() or not absent.any():
         raise DataError(
             f"{absent.sum()} absent regions among {len(absent)}: both kinds are needed to tell "
-            "them apart; measure more pairs, or a category whose members lack parts"
+            "them apart; measure more pairs, or objects that lack parts"
         )
-    sign = np.where(absent, 1.0, -1.0)
+    weight = _weights(examples) * np.where(absent, _ABSENT_WEIGHT, 1.0)
     columns = np.column_stack([np.ones(len(evidence)), evidence])
 
     def loss(rule: np.ndarray) -> float:
-        return float(np.logaddexp(0, -sign * (columns @ rule)).sum() + _RIDGE * rule @ rule)
+        score = columns @ rule
+        each = np.logaddexp(0, score) - overlap * score
+        return float(weight @ each + _RIDGE * rule[1:] @ rule[1:])
 
     bias, *weights = minimize(loss, np.zeros(columns.shape[1])).x
     return Rule(float(bias), tuple(float(w) for w in weights))
 
 
-def cross_validate(figures: Sequence[RegionFigure]) -> list[tuple[str, str, int, int, int]]:
-    """Rows: kind, what, how many are told absent by the rule in use, how many by rules that were
-    fitted on other pairs, of how many.
+def cross_validate(examples: Sequence[Example]) -> np.ndarray:
+    """The overlap (n,) to be expected of each example, by a rule that was fitted on examples with
+    neither its target nor, as a target, its reference (nor others of their series)."""
+    series = [(_series(e.reference), _series(e.target)) for e in examples]
+    evidence = _table(examples)[0]
+    found = np.zeros(len(examples))
+    for name in dict.fromkeys(target for _, target in series):
+        mine = [i for i, (_, target) in enumerate(series) if target == name]
+        rule = fit([e for e, its in zip(examples, series, strict=True) if name not in its])
+        found[mine] = rule.overlap(evidence[mine])
+    return found
 
-    Counted are regions that are absent, and regions that are there.
-    """
-    refitted = np.zeros(len(figures), bool)
-    fold = np.array([figure.pair % _FOLDS for figure in figures])
-    for number in np.unique(fold):
-        rule = fit([f for f, its in zip(figures, fold.tolist(), strict=True) if its != number])
-        mine = np.flatnonzero(fold == number).tolist()
-        refitted[mine] = rule.absent(np.array([figures[i].evidence for i in mine]))
-    in_use = np.array([figure.reason == ABSENT for figure in figures])
+
+def summary(
+    examples: Sequence[Example], overlap: np.ndarray
+) -> list[tuple[str, str, str, int, int, int, float, float]]:
+    """Rows: source, kind, "there" or "absent", number, how many of them are told absent, how many
+    are below the confidence that a transfer skips at, mean expected and mean true overlap."""
     rows = []
-    for kind in KINDS:
-        for state in ("absent", "there"):
-            chosen = np.array([f.kind == kind and f.state == state for f in figures])
-            told = int(in_use[chosen].sum()), int(refitted[chosen].sum())
-            rows.append((kind, state, told[0], told[1], int(chosen.sum())))
+    groups = dict.fromkeys((e.source, e.kind) for e in examples)
+    for source, kind in sorted(groups):
+        for state in (False, True):
+            chosen = np.array(
+                [(e.source, e.kind, e.absent) == (source, kind, state) for e in examples]
+            )
+            if chosen.any():
+                its, true = overlap[chosen], [e.overlap for e in examples]
+                rows.append((
+                    source, kind, "absent" if state else "there", int(chosen.sum()),
+                    int((its < SURELY_ABSENT).sum()), int((its < MIN_CONFIDENCE).sum()),
+                    float(its.mean()), float(np.array(true)[chosen].mean()),
+                ))  # fmt: skip
     return rows
 
 
-def _table(figures: Sequence[RegionFigure]) -> tuple[np.ndarray, np.ndarray]:
-    """Evidence (n, e) of regions in scans, and which are absent, (n,)."""
-    chosen = [f for f in figures if f.kind in KINDS]
-    evidence = np.array([f.evidence for f in chosen], float).reshape(len(chosen), -1)
-    return evidence, np.array([f.state == "absent" for f in chosen], bool)
+def _series(name: str) -> str:
+    """ "chair/mammut_1" and "stool/mammut_2" are of one series."""
+    return name.rpartition("/")[2].partition("_")[0]
 
 
-def _read(path: Path) -> list[RegionFigure]:
-    try:
-        return _ROWS.validate_json(read_file(path, DataError, _LARGEST))
-    except ValidationError as error:
-        fault = error.errors(include_url=False)[0]["msg"]
-        raise DataError(f"{path} is damaged ({fault}); delete it and start again") from None
+def _weights(examples: Sequence[Example]) -> np.ndarray:
+    """(n,) that give each source and kind of scan the same total, 1000 in all."""
+    groups = [(e.source, e.kind) for e in examples]
+    sizes = {group: groups.count(group) for group in set(groups)}
+    return np.array([1000 / len(sizes) / sizes[group] for group in groups])
+
+
+def _table(examples: Sequence[Example]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evidence (n, e), overlaps (n,), and which are absent (n,)."""
+    evidence = np.array([e.evidence for e in examples], float)
+    evidence = evidence.reshape(len(examples), len(Evidence._fields))
+    overlap = np.array([e.overlap for e in examples], float)
+    return evidence, overlap, np.array([e.absent for e in examples], bool)

@@ -75,8 +75,8 @@ class PoseFigure:
 class RegionFigure:
     """One region on one target. kind: "canonical", or one of `KINDS`; state: "there", "absent" or
     "hidden" in truth; reason: what was reported; cd_l1: canonical, of what was found from what is
-    true and was seen, `MISSED` where nothing was found, NaN where there was nothing to find;
-    evidence: of absence (`nrdf.regions.presence.evidence_of`)."""
+    true and was seen, `MISSED` where nothing was found, NaN where there was nothing to find; iou:
+    of the points found and true, likewise; evidence: of absence (`nrdf.regions.presence`)."""
 
     kind: str
     pair: int
@@ -85,7 +85,8 @@ class RegionFigure:
     reason: str
     found: int
     cd_l1: float
-    evidence: tuple[float, float]
+    iou: float
+    evidence: tuple[float, ...]
 
 
 def members(category: str, count: int) -> Iterator[Item]:
@@ -171,11 +172,16 @@ def pose_error(found: AlignedScan, true: Similarity) -> tuple[float, float]:
 
 
 def score_regions(
-    judge: Judge, category: str, pair: int, first_seed: int = FIRST_SEED
+    judge: Judge,
+    category: str,
+    pair: int,
+    first_seed: int = FIRST_SEED,
+    drop_absent: bool = True,
 ) -> list[RegionFigure]:
     """Every region of one member, found on another: canonical, and in scans of each kind.
 
-    The members of pair i have the seeds first_seed + 2 i and the next.
+    The members of pair i have the seeds first_seed + 2 i and the next. drop_absent: as of
+    `Taught.retrieve_all`.
     """
     family = get_family(category)
     rng = np.random.default_rng([first_seed, pair])
@@ -192,7 +198,7 @@ def score_regions(
     shared = {r for r, mask in regions.items() if exists[mask].mean() >= SHARED}
     regions = {r: mask for r, mask in regions.items() if r in shared or share[r] == 0}
     taught = judge.model.set_reference(PointCloud(taught_on.points, taught_on.normals))
-    matches = taught.retrieve_all(regions, PointCloud(surface.points))
+    matches = taught.retrieve_all(regions, PointCloud(surface.points), drop_absent=drop_absent)
     figures = _compare("canonical", pair, matches, surface.points, true, share)
     for kind in KINDS:
         pose = random_pose(rng)
@@ -203,7 +209,7 @@ def score_regions(
             cloud, shape = scan.cloud, pose.to_canonical(scan.cloud.points)
             seen = _labels(family, mesh, scan)
         found = bring_in(judge, cloud, UP)
-        matches = taught.retrieve_all(regions, found.embed())
+        matches = taught.retrieve_all(regions, found.embed(), drop_absent=drop_absent)
         matches = {name: found.in_scan(match) for name, match in matches.items()}
         figures += _compare(kind, pair, matches, shape, seen, share)
     return figures
@@ -237,16 +243,18 @@ def _compare(
             state = "there"
         elif len(true) <= UNSEEN * due:
             state = "hidden"
-        cd = float("nan")
+        cd = iou = float("nan")
         if state == "there":
             found = points[match.indices]
             cd = chamfer_l1(found, true) if len(found) else MISSED
+            common = int((labels[match.indices] == name).sum())
+            iou = common / (len(found) + len(true) - common)
         if state:
             said = match.presence
+            evidence = tuple(said.evidence or ())
+            found_points = len(match.indices)
             figures.append(
-                RegionFigure(
-                    kind, pair, name, state, said.reason, len(match.indices), cd, said.evidence
-                )
+                RegionFigure(kind, pair, name, state, said.reason, found_points, cd, iou, evidence)
             )
     return figures
 

@@ -46,8 +46,8 @@ from nrdf.units import in_words
 
 log = logging.getLogger(__name__)
 
-MIN_CONFIDENCE = 0.2
-"""A region found with less mean confidence is taken to be absent (`nrdf eval carry`)."""
+MIN_CONFIDENCE = 0.25
+"""A region found with less mean confidence is skipped (docs/scans.md)."""
 _LONGER = 2.0  # times the longest step on the reference, from which a carried one is said
 _THREADS = 4  # that plan: numpy leaves them little to do at once
 

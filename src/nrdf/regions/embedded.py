@@ -92,6 +92,13 @@ class Embedded:
         features = oriented_features(points, normals, NORMAL_WEIGHT)
         return self._oriented_tree.query(features)[0]
 
+    def nearest(self, points: np.ndarray, normals: np.ndarray, count: int) -> np.ndarray:
+        """The `count` working points (m, count) that are nearest to canonical points and normals
+        (m, 3), in position and weighted normal."""
+        features = oriented_features(points, normals, NORMAL_WEIGHT)
+        wanted = np.arange(1, min(count, len(self.points)) + 1)
+        return np.asarray(self._oriented_tree.query(features, k=wanted)[1])
+
     @cached_property
     def _oriented_tree(self) -> cKDTree:
         return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))

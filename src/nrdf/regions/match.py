@@ -13,7 +13,7 @@ from nrdf.regions.presence import Presence
 TRUST_SCALE = 0.2
 """Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
 and of the error that the field expects of itself."""
-FOUND = Presence("", 1.0, 1.0)
+FOUND = Presence("", 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class Match:
         reason.
     points: (m, 3) where C puts each point of the reference's region, in its order, in the
         target's frame and unit (raw prediction, off the surface by the field's error).
-    confidence: (k,) in [0, 1], for each of `indices`.
+    confidence: (k,) in [0, 1], for each of `indices`; their mean is the overlap with the true
+        region that is to be expected (`nrdf.regions.presence`).
     method: "mask" or "points"; "marked" where a person has marked it on the target.
     presence: whether the target has the region and the scan shows it.
     """
@@ -40,10 +41,12 @@ class Match:
         """Mean confidence of the region's points; 0 for an empty region."""
         return float(self.confidence.mean()) if len(self.confidence) else 0.0
 
-    def with_presence(self, presence: Presence) -> Match:
-        """This match, without its points where the region is not there or was not seen."""
-        if not presence.reason:
-            return replace(self, presence=presence)
+    def with_presence(self, presence: Presence, drop_absent: bool = True) -> Match:
+        """This match, its confidence scaled to the overlap that is to be expected; with
+        `drop_absent` without its points where the region is not there or was not seen."""
+        if not (presence.reason and drop_absent):
+            scaled = self.confidence * (presence.overlap / max(self.score, 1e-9))
+            return replace(self, presence=presence, confidence=np.minimum(scaled, 1.0))
         return replace(
             self, indices=self.indices[:0], confidence=self.confidence[:0], presence=presence
         )

@@ -23,7 +23,7 @@ from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, oriented_features, s
 from nrdf.regions.embedded import Embedded, encoder_subset
 from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
-from nrdf.regions.presence import find_presence
+from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
@@ -33,6 +33,7 @@ WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
 MINIMUM_POINTS = 256
 _CHUNK = 8192  # points described or inverted at a time
+_RETURNED = 2048  # of a target's points that are led back to the reference
 
 
 class Model:
@@ -139,6 +140,7 @@ class Taught:
         target: Any,
         method: str = "mask",
         refine: bool = False,
+        drop_absent: bool = True,
     ) -> dict[str, Match]:
         """Find regions on a target, which is embedded and mapped once for all of them.
 
@@ -153,6 +155,8 @@ class Taught:
         gets no majority anywhere: use "points" for spots.
         refine: move the mapped reference onto the target in a few steps of smooth registration
         (`nrdf.regions.refine`), about half a second a target.
+        drop_absent: a region that the target surely lacks, or that was not seen, comes back empty;
+        without it, as what was found for it all the same.
 
         Raises RegionError for a region that is empty or not on the reference (the message names
         it) or an unknown method, and CloudError for a target as `Model.embed` does.
@@ -175,7 +179,13 @@ class Taught:
                 name: self._by_points(self.map_points(indices, embedded, surface), embedded)
                 for name, indices in chosen.items()
             }
-        matches = {n: self._judged(m, chosen[n], embedded, surface) for n, m in matches.items()}
+        # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
+        off = embedded.distance(surface.points - surface.moved, surface.normals)
+        asked = self._returned(embedded)
+        matches = {
+            name: self._judged(match, chosen[name], embedded, surface, off, asked, drop_absent)
+            for name, match in matches.items()
+        }
         embedded.seconds["associate"] = time.perf_counter() - start
         return matches
 
@@ -269,13 +279,40 @@ class Taught:
         return replace(target, normals=normals)
 
     def _judged(
-        self, match: Match, indices: np.ndarray, target: Embedded, surface: Mapped
+        self,
+        match: Match,
+        indices: np.ndarray,
+        target: Embedded,
+        surface: Mapped,
+        off: np.ndarray,
+        returned: tuple[np.ndarray, np.ndarray],
+        drop_absent: bool,
     ) -> Match:
-        """The match, without its points where the target lacks the region or shows it not."""
-        region = surface.select(self._working_mask(indices))
-        # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
-        off = target.distance(region.points - region.moved, region.normals)
-        return match.with_presence(find_presence(region.existence, off))
+        """The match with the overlap that is to be expected; without its points where the target
+        lacks the region or does not show it. off: (n,) distances of the mapped surface from the
+        target; returned: as `_returned` gives it."""
+        inside = self._working_mask(indices)
+        found = np.zeros(len(target.cloud.points), bool)
+        found[match.indices] = True
+        found = found[target.working]
+        chosen, asked = returned
+        back = inside[asked[found[chosen]]]
+        evidence = evidence_of(
+            surface.existence[inside],
+            match.score,
+            float(found.mean() / inside.mean()),
+            float(back.mean()) if back.size else 0.0,
+        )
+        return match.with_presence(find_presence(evidence, off[inside]), drop_absent)
+
+    def _returned(self, target: Embedded) -> tuple[np.ndarray, np.ndarray]:
+        """Where a target's points lead back to: positions (m,) of some of its working points, and
+        the reference's working points (m, k) nearest to C(z_reference, θ(z_target, x))."""
+        chosen = np.random.default_rng(0).permutation(len(target.points))[:_RETURNED]
+        points, normals = target.points[chosen], target.normals[chosen]
+        k = self._describe(points, normals, target.z)
+        landed = self._invert(self.reference, k, normals)
+        return chosen, self.reference.nearest(landed.points, landed.normals, VOTERS)
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: Embedded, mapped: Mapped

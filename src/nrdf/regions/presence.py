@@ -1,66 +1,98 @@
-"""Whether a target has a region at all, and whether the scan shows it.
+"""How far a region that was found can be believed, and whether the target has it at all.
 
-A region that is not there must not come back as some other part. Two things speak for absence: the
-field's own estimate that the places exist, and mapped points of which not even the nearest ones lie
-on the target's surface. That the others don't only says that the scan may not have seen them.
+A region that is not there must not come back as some other part. What a retrieval knows of itself
+is put into one figure, the overlap with the true region that is to be expected: low where the field
+doubts that the places exist, where little was found and with little trust, and where what was found
+leads back to other places of the reference.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 ABSENT, NOT_OBSERVED = "absent", "not observed"
 
-# A logistic regression on 150 pairs of family members, with fields that came before the zoo's of
-# today. `nrdf eval presence` fits it anew: that tells no more than this (docs/scans.md). It leaves
-# every region of BSRC that exists clear of being emptied. What the field expects as its error adds
-# nothing to these two.
-_BIAS, _EXISTENCE, _DISTANCE = 0.77, -1.88, 1.45
-_NEAREST = 0.2  # share of the mapped points whose distance counts
-_USUAL_DISTANCE = 0.05  # canonical, in position and weighted normal
 _SEEN = 0.08  # distance within which a mapped point was observed
 _LEAST_SEEN = 0.1  # share of a region's mapped points that makes it observed
+_LEAST_SHARE = 0.02  # that counts as the least
+_SURE = 0.02  # shares of 0 and 1 are as sure as this
+
+
+class Evidence(NamedTuple):
+    """What is known of a region after retrieval; 0 is even odds, and full size.
+
+    existence: log odds that its places exist on the target, of their mean. trust: log odds of the
+    mean confidence of the points that were found. size: logarithm of how much was found, compared
+    with what the region has of the reference; 0 where it was as much or more. returned: log odds
+    that a point that was found leads back into the region on the reference.
+    """
+
+    existence: float
+    trust: float
+    size: float
+    returned: float
+
+
+# A logistic regression of the overlap with the true region, 0 where the target lacks it, on parts
+# of labelled real objects and on members of families, whole and in scans of three views: what
+# `nrdf eval presence` prints (docs/scans.md).
+BIAS = -0.78
+WEIGHTS = Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46)
+SURELY_ABSENT = 0.02
+"""Overlap to be expected below which a region is taken to be absent, and comes back empty."""
 
 
 @dataclass(frozen=True)
 class Presence:
     """What became of a region: reason "" where it was found, `ABSENT` or `NOT_OBSERVED` where not.
 
-    confidence: in [0, 1], that this is so; observed: share of its mapped points that lie where the
-    scan has points. evidence: what absence was judged by (`evidence_of`).
+    confidence: in [0, 1], that this is so. overlap: in [0, 1], intersection over union of what was
+    found and the true region, as it is to be expected. observed: share of the region's mapped
+    points that lie where the scan has points. evidence: what all this was judged by, None where
+    nothing was.
     """
 
     reason: str
     confidence: float
+    overlap: float
     observed: float
-    evidence: tuple[float, float] = (0.0, 0.0)
+    evidence: Evidence | None = None
 
 
-def evidence_of(existence: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
-    """What is known of a region's absence: the log odds that its places exist, and the logarithm of
-    how far even the nearest of its mapped points are off the target, in usual distances.
+def evidence_of(existence: np.ndarray, trust: float, size: float, returned: float) -> Evidence:
+    """Evidence from what is known of a region's m mapped points and of what was found.
 
-    existence, distance: (m,) as for `find_presence`.
+    existence: (m,) probabilities, 1 from a field that says nothing of the kind. trust: mean
+    confidence of the points found; size: their share of the target over the region's share of the
+    reference; returned: share of them that leads back into the region.
     """
-    share = float(np.clip(existence.mean(), 1e-3, 1 - 1e-3))
-    off = max(float(np.quantile(distance, _NEAREST)), 1e-3) / _USUAL_DISTANCE
-    return float(np.log(share / (1 - share))), float(np.log(off))
+    return Evidence(
+        _log_odds(float(existence.mean())),
+        _log_odds(trust),
+        float(np.log(np.clip(size, _LEAST_SHARE, 1.0))),
+        _log_odds(returned),
+    )
 
 
-def find_presence(existence: np.ndarray, distance: np.ndarray) -> Presence:
-    """Presence of a region on a target from what is known of its m mapped points.
+def find_presence(evidence: Evidence, distance: np.ndarray) -> Presence:
+    """Presence of a region on a target.
 
-    existence: (m,) probabilities, 1 from a field that says nothing of the kind; distance: (m,) of
-    the mapped points from the target's points, canonical, in position and weighted normal.
+    distance: (m,) of its mapped points from the target's, canonical, in position and weighted
+    normal.
     """
-    evidence = evidence_of(existence, distance)
-    score = _BIAS + _EXISTENCE * evidence[0] + _DISTANCE * evidence[1]
-    absent = float(1 / (1 + np.exp(-score)))
     observed = float((distance < _SEEN).mean())
-    if absent > 0.5:
-        return Presence(ABSENT, absent, observed, evidence)
+    score = BIAS + float(np.dot(WEIGHTS, evidence))
+    overlap = float(1 / (1 + np.exp(-score)))
+    if overlap < SURELY_ABSENT:
+        return Presence(ABSENT, 1 - overlap, overlap, observed, evidence)
     if observed < _LEAST_SEEN:
-        return Presence(NOT_OBSERVED, (1 - absent) * (1 - observed), observed, evidence)
-    return Presence("", 1 - absent, observed, evidence)
+        return Presence(NOT_OBSERVED, 1 - observed, overlap, observed, evidence)
+    return Presence("", overlap, overlap, observed, evidence)
+
+
+def _log_odds(share: float) -> float:
+    share = float(np.clip(share, _SURE, 1 - _SURE))
+    return float(np.log(share / (1 - share)))
