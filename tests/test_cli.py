@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from nrdf import cli
-from nrdf.bundled import bundled_chair
+from nrdf.bundled import REAL, bundled_chair
 from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.ply import read_header, read_scalars
@@ -243,8 +243,12 @@ def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path
     report = json.loads((out / "report.json").read_text())
     found = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()}
     assert found == {MANIFEST, *report["files"]}
-    rows = report["found"]
-    assert len(rows) == 5
+    real = [row for row in report["found"] if row["chair"] == REAL]
+    rows = [row for row in report["found"] if row["chair"] == "rocker"]
+    assert len(real) == len(rows) == 5 and real[0]["true"] is real[0]["iou"] is None
+    # The scan lies as it was scanned; the job says how the chair stands in it.
+    job = json.loads((out / REAL / "toolpaths.json").read_text())
+    np.testing.assert_allclose(job["pose"]["up"], [0, 0, 1], atol=0.02)
     for row in rows:
         _, truth = bundled_chair(row["chair"])
         assert row["true"] == int(truth[row["region"]].sum())

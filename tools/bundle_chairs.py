@@ -1,6 +1,8 @@
 """Make the chairs of `nrdf demo`: members of the parametric family that no training set holds.
 
-    python tools/bundle_chairs.py
+    python tools/bundle_chairs.py [objects/]
+
+With a folder of labelled objects (docs/benchmark.md) that has it, also the mesh of the real chair.
 
 Writes src/nrdf/bundled/<name>.npz: points (8192, 3) float32 in metres, without normals, as a
 sensor would give them; region (8192,) uint8, the index into `regions` (name 0 is "none"). And the
@@ -11,11 +13,12 @@ its checksum into that knowledge, chair.yaml.
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from nrdf.bundled import KNOWLEDGE, REFERENCE, REGIONS_FILE, bundled_chair
+from nrdf.bundled import KNOWLEDGE, REAL, REFERENCE, REGIONS_FILE, bundled_chair
 from nrdf.process.lesson import checksum
 from nrdf.shapes.families import get_family
 
@@ -53,6 +56,18 @@ def main() -> None:
     np.savez_compressed(BUNDLED / REGIONS_FILE, **masks)
     line = f"sha256: {checksum(BUNDLED / f'{REFERENCE}.npz')}"
     KNOWLEDGE.write_text(re.sub("sha256: .*", line, KNOWLEDGE.read_text()))
+    for folder in sys.argv[1:]:
+        bundle_mesh(Path(folder))
+
+
+def bundle_mesh(folder: Path) -> None:
+    """The real chair, standing on the floor, in metres: its longest side is its height."""
+    with np.load(folder / "chair" / f"{REAL}.npz", allow_pickle=False) as arrays:
+        vertices, faces = arrays["vertices"], arrays["faces"]
+    vertices = HEIGHT * (vertices - [0.0, vertices[:, 1].min(), 0.0])
+    np.savez_compressed(
+        BUNDLED / f"{REAL}.npz", vertices=vertices.astype(np.float32), faces=faces.astype(np.int32)
+    )
 
 
 if __name__ == "__main__":

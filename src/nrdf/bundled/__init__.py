@@ -1,7 +1,8 @@
 """Chairs that come with the package: what the demo and the examples run on.
 
-They are members of the parametric family that no training set holds (`tools/bundle_chairs.py`
-made them), so their regions are known exactly.
+Four are members of the parametric family that no training set holds, so their regions are known
+exactly. One is the mesh of a real chair (CC-BY-4.0, ATTRIBUTION.txt), to be scanned.
+`tools/bundle_chairs.py` made the files.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ import numpy as np
 
 from nrdf.cloud import PointCloud
 from nrdf.errors import DataError, unknown_name
+from nrdf.mesh import Mesh
 
 REFERENCE = "reference"
 TARGETS = ("ladder-back", "rocker", "armchair")
+REAL = "stefan"
+"""The real chair."""
 KNOWLEDGE = Path(__file__).parent / "chair.yaml"
 """What is done to the reference's five regions: a knowledge file."""
 REGIONS_FILE = "reference-regions.npz"
@@ -37,3 +41,17 @@ def bundled_chair(name: str) -> tuple[PointCloud, dict[str, np.ndarray]]:
             f"the bundled chair '{name}' is damaged ({error}); install nrdf again"
         ) from None
     return cloud, {region_name: region == i for i, region_name in enumerate(names) if i}
+
+
+def bundled_mesh() -> Mesh:
+    """The real chair in metres: +X forward, +Y up, its feet at y = 0.
+
+    Raises DataError if its file is missing or damaged.
+    """
+    try:
+        with np.load(Path(__file__).parent / f"{REAL}.npz", allow_pickle=False) as arrays:
+            return Mesh(arrays["vertices"].astype(np.float64), arrays["faces"].astype(np.int64))
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise DataError(
+            f"the bundled chair '{REAL}' is damaged ({error}); install nrdf again"
+        ) from None
