@@ -18,11 +18,11 @@ WORST = 10
 
 
 def worst_pairs(figures: Sequence[PairFigure], count: int = WORST) -> list[PairFigure]:
-    """The pairs of least mean part IoU, the worst first; those without a part in common are left
-    out."""
-    means = {i: _mean(figure) for i, figure in enumerate(figures)}
-    known = [i for i, mean in means.items() if not np.isnan(mean)]
-    return [figures[i] for i in sorted(known, key=lambda i: means[i])[:count]]
+    """The pairs of least mean part IoU, the worst first, of equal ones those with most parts; those
+    without a part in common are left out."""
+    known = [(figure, found) for figure in figures if (found := _found(figure))]
+    known.sort(key=lambda item: (np.mean(item[1]), -len(item[1])))
+    return [figure for figure, _ in known[:count]]
 
 
 def draw_pair(finder: Finder, spec: MethodSpec, figure: PairFigure, path: Path) -> None:
@@ -36,7 +36,7 @@ def draw_pair(finder: Finder, spec: MethodSpec, figure: PairFigure, path: Path) 
     said = []
     for name, part in parts.items():
         text = part.reason or ("" if part.found else "nowhere")
-        value = part.state if part.iou is None else f"{part.iou:.2f}"
+        value = (part.state or "not counted") if part.iou is None else f"{part.iou:.2f}"
         said.append(f"{name} {value}" + f" ({text})" * bool(text))
     own = _true(finder.labels, whole)
     drawn = {name: own[name] for name in (*parts, *finder.labels.ignored) if name in own}
@@ -61,9 +61,8 @@ def draw_worst(
     return paths
 
 
-def _mean(figure: PairFigure) -> float:
-    values = [part.iou or 0.0 for part in figure.parts if part.state == THERE]
-    return float(np.mean(values)) if values else float("nan")
+def _found(figure: PairFigure) -> list[float]:
+    return [part.iou or 0.0 for part in figure.parts if part.state == THERE]
 
 
 def _true(labels: Labels, seen: LabelledCloud) -> dict[str, np.ndarray]:

@@ -19,6 +19,7 @@ from nrdf.process.transfer import MIN_CONFIDENCE
 
 Pairs = Sequence[tuple[str, str]]
 _RESAMPLES = 10_000
+_LEAST_TARGETS = 5  # of an interval; fewer say nothing about others
 _RIGHT = 5.0  # degrees within which a pose is right
 
 
@@ -143,7 +144,8 @@ def _mean(parts: Sequence[PartFigure]) -> float:
 def difference_of(
     figures: Sequence[PairFigure], of: Row, one: str = "nrdf", other: str = "registration"
 ) -> Difference | None:
-    """How much better one method is than another, where both were run: figures are a set's."""
+    """How much better one method is than another on a set's figures; None unless both were run, on
+    five targets or more."""
     iou: dict[str, dict[tuple[str, str, str], float]] = {one: {}, other: {}}
     for figure in figures:
         if figure.views == of.views and figure.method in iou:
@@ -152,7 +154,7 @@ def difference_of(
                     key = figure.reference, figure.target, part.part
                     iou[figure.method][key] = part.iou or 0.0
     targets = list(dict.fromkeys(target for _, target, _ in iou[one]))
-    if iou[one].keys() != iou[other].keys() or len(targets) < 2:
+    if iou[one].keys() != iou[other].keys() or len(targets) < _LEAST_TARGETS:
         return None
     number = {target: i for i, target in enumerate(targets)}
     which = np.array([number[target] for _, target, _ in iou[one]])
