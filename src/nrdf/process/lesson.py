@@ -12,6 +12,7 @@ import numpy as np
 
 from nrdf.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.errors import CloudError, NrdfError, ProcessError
+from nrdf.files import open_file
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import listed, read_knowledge
 from nrdf.regions.files import read_region_file
@@ -132,8 +133,15 @@ def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal digits."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """SHA-256 of a file, in hexadecimal digits.
+
+    Raises ProcessError for what is no regular file, a bag's folder for instance.
+    """
+    digest = hashlib.sha256()
+    with open_file(path, ProcessError) as file:
+        while part := file.read(1 << 20):
+            digest.update(part)
+    return digest.hexdigest()
 
 
 def _usual(category: str) -> str:

@@ -17,6 +17,7 @@ from pydantic import (
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
+from nrdf.files import read_file, require_file
 from nrdf.ply import write_atomically
 from nrdf.similarity import Similarity
 from nrdf.strict import Location, Strict, explain
@@ -114,15 +115,14 @@ def read_job(folder: str | Path) -> Job:
     if path.is_dir() or not path.exists():
         path = path / FILE
     try:
-        if path.stat().st_size > _LARGEST_FILE:
+        if require_file(path, ProcessError) > _LARGEST_FILE:
             raise ProcessError(
                 f"{path} is larger than {_LARGEST_FILE >> 20} MiB: no file of tool paths"
             )
-        text = path.read_bytes()
-    except OSError as error:
+        text = read_file(path, ProcessError, _LARGEST_FILE)
+    except ProcessError as error:
         raise ProcessError(
-            f"cannot read the tool paths {path}: {error.strerror or error}; give the folder that "
-            "`nrdf transfer` wrote"
+            f"cannot read the tool paths: {error}; give the folder that `nrdf transfer` wrote"
         ) from None
     return _parse(text, str(path))
 
