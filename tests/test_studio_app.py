@@ -14,7 +14,7 @@ import nrdf
 from nrdf.errors import ModelError
 from nrdf.studio import simulator, uploads
 from nrdf.studio.app import Studio
-from nrdf.studio.body import REFERENCE
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.panel_targets import ALL
 from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session

@@ -14,8 +14,8 @@ from nrdf.errors import ProcessError, RegionError
 from nrdf.process.lesson import read_lesson
 from nrdf.process.toolpath import read_job
 from nrdf.studio.bench import Bench
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
 from nrdf.studio.saving import save_job, save_picture, save_programs, zipped
 from nrdf.studio.session import Session

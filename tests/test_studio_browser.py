@@ -25,7 +25,7 @@ from nrdf.bundled import bundled_chair
 from nrdf.process.lesson import read_lesson
 from nrdf.process.toolpath import read_job
 from nrdf.studio.app import Studio
-from nrdf.studio.body import REFERENCE
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.mouse import view_of
 from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import socket
+
 import pytest
 
 pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 
 import viser
+from viser._messages import FileTransferPart, FileTransferStartUpload
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from nrdf import cli
 from nrdf.errors import OutputError
 from nrdf.studio.serving import open_server
+from nrdf.studio.uploads import LARGEST_UPLOAD
 
 
 @pytest.fixture
@@ -66,6 +70,13 @@ def test_the_verb_prints_its_address_and_ends_with_130(tmp_path, monkeypatch, ca
     assert (tmp_path / "s" / "clouds").is_dir()
 
 
+def test_a_damaged_session_is_said_and_the_studio_runs(tmp_path, monkeypatch, capsys):
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s" / "session.json").write_text('{"version": 1, "category": 3}')
+    assert run(monkeypatch, "--session", str(tmp_path / "s")) == 130
+    assert "It is kept as it was in" in " ".join(capsys.readouterr().err.split())
+
+
 def test_bound_elsewhere_it_warns(tmp_path, monkeypatch, capsys):
     assert run(monkeypatch, "--host", "0.0.0.0", "--session", str(tmp_path / "s")) == 130
     assert "there is no password" in " ".join(capsys.readouterr().err.split())
@@ -85,3 +96,68 @@ def test_a_session_that_cannot_be_kept_is_refused(tmp_path, monkeypatch, capsys)
     (tmp_path / "file").write_text("")
     assert run(monkeypatch, "--session", str(tmp_path / "file" / "s")) == 2
     assert "give another one with --session" in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("127.0.0.1:8470", 200),
+        ("localhost", 200),
+        ("[::1]:8470", 200),
+        ("evil.example:8470", 403),
+        ("127.0.0.1.evil.example", 403),
+        ("", 403),
+    ],
+)
+def test_a_name_that_was_made_to_lead_here_gets_nothing(server, host, status):
+    port = server.get_port()
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as asked:
+        asked.sendall(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        assert asked.recv(4096).startswith(f"HTTP/1.1 {status} ".encode())
+    if host:
+        version = f"viser-v{viser.__version__}"
+        header = {"subprotocols": [version], "host": host}
+        assert handshake(port, **header) == (101 if status == 200 else 403)
+
+
+def handshake(port, subprotocols, host):
+    """The status of a WebSocket that is asked for at that host, without an origin."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as asked:
+        lines = [
+            "GET / HTTP/1.1", f"Host: {host}", "Upgrade: websocket", "Connection: Upgrade",
+            "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==", "Sec-WebSocket-Version: 13",
+            f"Sec-WebSocket-Protocol: {subprotocols[0]}", "", "",
+        ]  # fmt: skip
+        asked.sendall("\r\n".join(lines).encode())
+        return int(asked.recv(4096).split()[1])
+
+
+def test_two_hosts_are_refused(server):
+    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=10) as asked:
+        asked.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n")
+        assert asked.recv(4096).startswith(b"HTTP/1.1 403 ")
+
+
+def test_uploads_hold_no_more_than_their_limit(server):
+    button = server.gui.add_upload_button("file")
+    states = server.gui._current_file_upload_states
+
+    def send(message):
+        for handler in server.gui._websock_interface._incoming_handlers[type(message)]:
+            handler(0, message)
+
+    def start(name, size, parts=1):
+        uuid = button._impl.uuid
+        send(FileTransferStartUpload(uuid, name, f"{name}.ply", "", parts, size))
+
+    start("huge", LARGEST_UPLOAD + 1)
+    start("no bytes in many parts", 10, 10**9)
+    start("negative", -(10**12))
+    assert not states
+    start("one", LARGEST_UPLOAD - 100)
+    start("another", 1000)
+    assert list(states) == ["one"]
+    start("small", 10, 2)
+    for part in range(2):
+        send(FileTransferPart(button._impl.uuid, "small", part, b"x" * 8))
+    assert "small" not in states, "more than was announced"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 
 import numpy as np
 import pytest
@@ -10,10 +12,11 @@ import pytest
 from nrdf.errors import OutputError, ProcessError, RegionError
 from nrdf.process.knowledge_file import read_knowledge
 from nrdf.process.lesson import read_lesson
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.saving import place_of
-from nrdf.studio.session import FILE, Session
+from nrdf.studio.session import Session
+from nrdf.studio.session_file import FILE
 from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
 from taught_box import SIZE, cloud, faces
 
@@ -91,19 +94,63 @@ def test_starting_anew_can_be_undone(painted):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda c: {**c, "version": 9}, "from a newer nrdf"),
         (lambda c: {**c, "colour": 1}, "unknown key 'colour'"),
         (lambda c: {**c, "reference": {"name": "x", "file": "../../secret.ply"}}, "reference.file"),
-        (lambda c: {**c, "reference": {"name": "x", "file": "cloud-9.ply"}}, "cannot read"),
+        (lambda c: {**c, "reference": {"name": "x", "file": "cloud-9.ply"}}, "no file|cannot read"),
         (lambda c: {**c, "regions": [{**c["regions"][0], "indices": [10**6]}]}, "does not have"),
+        (lambda c: {**c, "regions": [{**c["regions"][0], "colour": [300, 0, 0]}]}, "255"),
+        (lambda c: {**c, "regions": [{**c["regions"][0], "steps": []}]}, "regions.0.steps"),
+        (lambda c: {**c, "regions": [{**c["regions"][0], "name": "../x"}]}, "regions.0.name"),
+        (lambda c: {**c, "regions": [*c["regions"], *c["regions"]]}, "twice"),
+        (lambda c: {**c, "targets": [{**c["targets"][0], "name": ".."}]}, "targets.0.name"),
+        (lambda c: {**c, "targets": [{**c["targets"][0], "name": "a/b"}]}, "targets.0.name"),
+        (lambda c: {**c, "targets": [{**c["targets"][0], "name": "reference"}]}, "no name"),
+        (lambda c: {**c, "version": 0}, "version"),
+        (lambda c: [], "must be a mapping"),
     ],
 )
-def test_a_session_file_that_cannot_be_right_is_refused(painted, change, message):
-    path = painted.session.folder / FILE
+def test_a_session_that_is_damaged_is_kept_aside_whole(painted, change, message):
+    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    folder = painted.session.folder
+    path = folder / FILE
     path.write_text(json.dumps(change(json.loads(path.read_text()))))
-    with pytest.raises(ProcessError, match=message) as raised:
+    before = {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    fresh = again(painted)
+    assert re.search(message, fresh.damage) and "damaged-1" in fresh.damage
+    assert fresh.document.reference is None and not fresh.restored
+    aside = folder / "damaged-1"
+    after = {p.relative_to(aside): p.read_bytes() for p in aside.rglob("*") if p.is_file()}
+    assert after == before
+    assert again(painted).damage == "", "the new one is whole"
+
+
+def test_what_was_put_aside_can_be_put_back(painted):
+    folder = painted.session.folder
+    text = (folder / FILE).read_bytes()
+    (folder / FILE).write_bytes(text[:-7])
+    assert again(painted).damage
+    shutil.rmtree(folder / "clouds")
+    (folder / "damaged-1" / "clouds").rename(folder / "clouds")
+    (folder / FILE).write_bytes(text)
+    kept = again(painted).document
+    assert kept.reference.name == "box.ply" and [r.name for r in kept.regions] == ["top"]
+
+
+def test_a_session_of_a_newer_version_is_left_alone(painted):
+    path = painted.session.folder / FILE
+    content = {**json.loads(path.read_text()), "version": 9, "arms": []}
+    path.write_text(json.dumps(content))
+    with pytest.raises(ProcessError, match=r"from a newer nrdf.*--session"):
         again(painted)
-    assert "--session" in str(raised.value)
+    assert json.loads(path.read_text()) == content
+
+
+def test_a_session_file_that_is_no_file_is_said(painted):
+    path = painted.session.folder / FILE
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(OutputError, match="--session"):
+        again(painted)
 
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path):

@@ -55,6 +55,8 @@ def studio(
     if not categories:
         raise ModelError("there is no trained model in this installation: install nrdf again")
     kept = Session(session)
+    if kept.damage:
+        errors.print(kept.damage, style="yellow")
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(

@@ -13,9 +13,9 @@ import viser
 
 from nrdf.errors import NrdfError
 from nrdf.studio.bench import Bench, Described
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.colours import COLOURINGS, likeness_colours
 from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
 from nrdf.studio.mouse import Mouse
 from nrdf.studio.panel import Activity, Panel
@@ -75,6 +75,8 @@ class Studio:
         self.trial = Trial(self, robot, tool_frame)
         server.on_client_connect(self._welcome)
         self.restore()
+        if session.damage:
+            self.panel.trouble(f"⚠ **The session was damaged**: {session.damage}")
 
     # --- what is shown
 

@@ -14,9 +14,8 @@ from nrdf.process.knowledge_check import Checked, check_process
 from nrdf.process.limits import DOUBTFUL
 from nrdf.process.transfer import Teacher, Transferred, touched
 from nrdf.regions.embedded import Embedded
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
-from nrdf.studio.session import Document, Painted, Target
+from nrdf.studio.document import REFERENCE, Document, Painted, Target
 from nrdf.studio.teaching import lesson_of, process_of
 from nrdf.studio.worker import Progress
 

@@ -15,9 +15,6 @@ from nrdf.process.surface import Surface
 from nrdf.regions.model import WORKING_POINTS
 from nrdf.studio.painting import Canvas
 
-REFERENCE = "reference"
-"""The key of the reference; targets have their names."""
-
 
 class Body:
     """An object to be shown and painted on.

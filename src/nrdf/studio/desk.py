@@ -15,9 +15,10 @@ from nrdf.errors import NrdfError, RegionError
 from nrdf.names import usable_file_name
 from nrdf.process.lesson import Lesson, overlaps
 from nrdf.regions.region import region_name_fault
-from nrdf.studio.body import REFERENCE, Body
+from nrdf.studio.body import Body
 from nrdf.studio.colours import next_colour
-from nrdf.studio.session import Document, Painted, Session, Target
+from nrdf.studio.document import REFERENCE, Document, Painted, Target
+from nrdf.studio.session import Session
 from nrdf.studio.teaching import changed_step, new_step, painted_of
 from nrdf.studio.uploads import shown_name, to_paint_on
 

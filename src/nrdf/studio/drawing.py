@@ -8,9 +8,9 @@ import numpy as np
 
 from nrdf.process.job_folder import panel_of
 from nrdf.studio.bench import Bench
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.colours import confidence_colours, painted_colours
 from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
 
 _DEEP, _PALE = 0.5, 0.62
 """Shares of a region's colour in the lines on it, and in the region where there are lines."""

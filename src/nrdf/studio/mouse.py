@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.body import REFERENCE
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import found
 from nrdf.studio.stage import Figure
 from nrdf.studio.view import View, inside

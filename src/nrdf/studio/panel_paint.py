@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nrdf.errors import RegionError
-from nrdf.studio.body import REFERENCE
+from nrdf.studio.document import REFERENCE
 
 if TYPE_CHECKING:
     from nrdf.studio.panel import Panel

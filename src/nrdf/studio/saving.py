@@ -21,8 +21,8 @@ from nrdf.process.job_folder import job_of, panel_of, write_transfer
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
 from nrdf.studio.bench import Bench, Result
-from nrdf.studio.body import REFERENCE
 from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
 from nrdf.studio.teaching import knowledge_of
 from nrdf.swap import MANIFEST
 

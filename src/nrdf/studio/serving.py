@@ -6,38 +6,100 @@ import contextlib
 import io
 import re
 import socket
-from functools import partial
+from collections.abc import Callable
+from http import HTTPStatus
+from typing import Any
 from unittest.mock import patch
 
 import viser
 import websockets.asyncio.server
+from viser._messages import FileTransferPart, FileTransferStartUpload
+from viser.infra import ClientId
+from websockets.asyncio.server import Request, Response, ServerConnection
 
 from nrdf.errors import OutputError
+from nrdf.studio.uploads import LARGEST_UPLOAD, shown_name, too_large
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_OWN_PAGES = re.compile(r"http://(127\.0\.0\.1|localhost|\[::1\])(:\d+)?")
+_OWN_HOSTS = r"(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"
+_OWN_PAGES = re.compile(f"http://{_OWN_HOSTS}")
 
 
 def open_server(host: str, port: int) -> viser.ViserServer:
     """A viser server with nothing on it; on the next free port where `port` is taken.
 
-    On loopback, only pages of loopback may connect: a page of the internet that is open in the
-    same browser may not. Raises OutputError for a port or host that cannot be listened on.
+    On loopback, only pages of loopback may connect, by loopback's own names: neither a page of the
+    internet that is open in the same browser, nor one whose name was made to lead here, gets
+    anything. Uploads that are too large are refused before memory is taken. Raises OutputError for
+    a port or host that cannot be listened on.
     """
     if not 1 <= port <= 65535:
         raise OutputError(f"--port {port}: must be from 1 to 65535")
     _check(host)
     # viser hands no such limit on to websockets, and prints a banner of its own.
-    origins = [_OWN_PAGES, None] if host in LOOPBACK else None
-    serve = partial(websockets.asyncio.server.serve, origins=origins)
+    serve = websockets.asyncio.server.serve
     with (
-        patch.object(websockets.asyncio.server, "serve", serve),
+        patch.object(
+            websockets.asyncio.server, "serve", _serve_own(serve) if host in LOOPBACK else serve
+        ),
         contextlib.redirect_stdout(io.StringIO()),
     ):
         server = viser.ViserServer(host, port, label="nrdf studio", verbose=False)
     # Every page could ask for a public address that leads here.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
+    _limit_uploads(server)
     return server
+
+
+def _serve_own(serve: Callable[..., Any]) -> Callable[..., Any]:
+    """websockets' `serve` for loopback's own names and pages alone."""
+
+    def serve_own(*args: Any, process_request: Any = None, **options: Any) -> Any:
+        def answer(connection: ServerConnection, request: Request) -> Response | None:
+            hosts = request.headers.get_all("Host")
+            if len(hosts) != 1 or not re.fullmatch(_OWN_HOSTS, hosts[0]):
+                return connection.respond(
+                    HTTPStatus.FORBIDDEN, "the studio answers to the address that it has printed\n"
+                )
+            found: Response | None = process_request and process_request(connection, request)
+            return found
+
+        return serve(*args, process_request=answer, origins=[_OWN_PAGES, None], **options)
+
+    return serve_own
+
+
+def _limit_uploads(server: viser.ViserServer) -> None:
+    """Let uploads on their way hold no more than `LARGEST_UPLOAD` in all; viser takes any."""
+    gui = server.gui
+    inner = gui._websock_interface
+    begin, go_on = gui._handle_file_transfer_start, gui._handle_file_transfer_part
+    underway = gui._current_file_upload_states
+
+    def limited_start(client_id: ClientId, message: FileTransferStartUpload) -> None:
+        others = sum(state["total_bytes"] for state in list(underway.values()))
+        parts_fit = 0 <= message.part_count <= message.size_bytes
+        if message.size_bytes + others <= LARGEST_UPLOAD and parts_fit:
+            begin(client_id, message)
+        elif client_id in server.get_clients():
+            server.get_clients()[client_id].add_notification(
+                "Too large", too_large(shown_name(message.filename), message.size_bytes),
+                color="red", auto_close_seconds=15,
+            )  # fmt: skip
+
+    def limited_part(client_id: ClientId, message: FileTransferPart) -> None:
+        state = underway.get(message.transfer_uuid)
+        if state is None:
+            return
+        if state["transferred_bytes"] + len(message.content) > state["total_bytes"]:
+            underway.pop(message.transfer_uuid, None)  # more than it has announced
+        else:
+            go_on(client_id, message)
+
+    inner.unregister_handler(FileTransferStartUpload, begin)  # type: ignore[arg-type]
+    inner.register_handler(FileTransferStartUpload, limited_start)
+    inner.unregister_handler(FileTransferPart, go_on)  # type: ignore[arg-type]
+    inner.register_handler(FileTransferPart, limited_part)
 
 
 def _check(host: str) -> None:

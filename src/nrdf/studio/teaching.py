@@ -12,7 +12,9 @@ from nrdf.process.knowledge import Knowledge, Process, Trajectory
 from nrdf.process.knowledge_file import validated
 from nrdf.process.knowledge_new import DEFAULTS
 from nrdf.process.lesson import Lesson, bind, checksum, overlaps
-from nrdf.studio.session import CLOUDS, Document, Painted, Session
+from nrdf.studio.document import Document, Painted
+from nrdf.studio.session import Session
+from nrdf.studio.session_file import CLOUDS
 from nrdf.units import OTHER_UNITS, to_si
 
 PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")

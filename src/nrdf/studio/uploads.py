@@ -37,10 +37,7 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
             f"{shown} is no point cloud or mesh: the name must end with one of {', '.join(ENDINGS)}"
         )
     if len(content) > LARGEST_UPLOAD:
-        raise CloudError(
-            f"{shown} has {len(content) / 2**20:.0f} MiB; at most {LARGEST_UPLOAD >> 20} MiB are "
-            "taken: thin it out, or use the command line, which has no limit"
-        )
+        raise CloudError(too_large(shown, len(content)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"upload{ending}"
         path.write_bytes(content)
@@ -50,6 +47,14 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
         except NrdfError as error:
             raise type(error)(str(error).replace(str(path), shown)) from None
     return in_metres(cloud, known_unit(cloud, unit, category, shown, "the unit"))
+
+
+def too_large(shown: str, size: int) -> str:
+    """What is said of a file of that size, bytes, that is too large."""
+    return (
+        f"{shown} has {size / 2**20:.0f} MiB; at most {LARGEST_UPLOAD >> 20} MiB are taken: thin "
+        "it out, or use the command line, which has no limit"
+    )
 
 
 def bundled(name: str) -> PointCloud:

@@ -1,0 +1,73 @@
+"""What a person has made in the studio.
+
+A `Document` is never changed, only replaced, so that undoing is going back to an earlier one, and
+work in the background can look at one while the next is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from nrdf.cloud import PointCloud
+
+REFERENCE = "reference"
+"""The key of the reference; targets have their names."""
+
+
+@dataclass(frozen=True)
+class Painted:
+    """A region of the reference: mask (n,) bool; colour: red, green, blue, 0 to 255; steps: what is
+    done to it, each as the mapping that a knowledge file holds, SI (it need not be right yet)."""
+
+    name: str
+    colour: tuple[int, int, int]
+    mask: np.ndarray
+    steps: tuple[Mapping[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """An object: what people call it, its cloud in metres, and its file in the session's folder."""
+
+    name: str
+    cloud: PointCloud
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class Target:
+    """An object that the process is brought to. corrected: regions painted by hand on it, name to
+    mask (m,) bool, in place of those that are found."""
+
+    object: Loaded
+    corrected: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Document:
+    """Everything of a session that a person has made."""
+
+    category: str = "chair"
+    reference: Loaded | None = None
+    regions: tuple[Painted, ...] = ()
+    targets: tuple[Target, ...] = ()
+    allow_overlap: bool = False
+
+    def region(self, name: str) -> Painted | None:
+        """The region of that name, or None."""
+        return next((r for r in self.regions if r.name == name), None)
+
+    def with_region(self, name: str, called: str = "", **changes: Any) -> Document:
+        """The document with something of a region changed; `called`: its new name."""
+        changes |= {"name": called or name}
+        regions = tuple(replace(r, **changes) if r.name == name else r for r in self.regions)
+        return replace(self, regions=regions)
+
+    def with_target(self, name: str, **changes: Any) -> Document:
+        """The document with something of a target changed."""
+        targets = tuple(replace(t, **changes) if t.object.name == name else t for t in self.targets)
+        return replace(self, targets=targets)

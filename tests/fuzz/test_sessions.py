@@ -1,0 +1,84 @@
+"""Sessions of the studio, altered: opened, or kept aside with a reason; the page can show each."""
+
+from __future__ import annotations
+
+import copy
+import json
+import shutil
+
+import numpy as np
+import pytest
+from fuzzing import altered, damaged, outcome_of, tries
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nrdf.errors import NrdfError
+from nrdf.studio.colours import painted_colours
+from nrdf.studio.desk import Desk
+from nrdf.studio.document import REFERENCE
+from nrdf.studio.session import Session
+from nrdf.studio.session_file import FILE
+from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
+from taught_box import SIZE, cloud, faces
+
+
+@pytest.fixture(scope="module")
+def valid(tmp_path_factory):
+    """A session's folder, and what its file holds."""
+    folder = tmp_path_factory.mktemp("valid") / "session"
+    desk = Desk(Session(folder))
+    desk.open_reference("box.ply", cloud(count=400), "chair")
+    for name, kind in (("top", "sand"), ("front", "paint")):
+        desk.add_region(name)
+        mask = np.zeros(400, bool)
+        mask[faces(cloud(count=400))[name][:20]] = True
+        desk.paint(REFERENCE, name, mask)
+        desk.restart_step(name, 0, kind)
+    desk.add_target("new.ply", cloud(1.1 * SIZE, 300, 1))
+    desk.paint("new", "top", np.arange(300) < 12)
+    return folder, json.loads((folder / FILE).read_text())
+
+
+def opened(valid, folder, text):
+    """The altered session as the page shows it, or an NrdfError."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(valid, folder)
+    (folder / FILE).write_bytes(text)
+    session = outcome_of(lambda: Session(folder))
+    if isinstance(session, NrdfError):
+        assert (folder / FILE).read_bytes() == text
+        return
+    if session.damage:
+        assert (folder / "damaged-1" / FILE).read_bytes() == text
+        assert len(list((folder / "damaged-1" / "clouds").iterdir())) == 2
+        return
+    desk = Desk(session)
+    for key in desk.objects():
+        body = desk.body(key)
+        painted = [(r.colour, np.flatnonzero(desk.mask(key, r.name)), None)
+                   for r in desk.document.regions]  # fmt: skip
+        painted_colours(len(body.points), painted)
+    for region in desk.document.regions:
+        for number, step in enumerate(region.steps):
+            assert np.isfinite(list(shown_numbers(step).values())).all()
+            float(step["tool"].get("radius_m", 0.0))
+            outcome_of(lambda r=region, n=number: process_of(r, n))
+    outcome_of(lambda: lesson_of(session, desk.document))
+    session.save()
+    assert not Session(folder).damage, "what was opened can be opened again"
+
+
+@tries(60)
+@given(st.data())
+def test_altered_sessions(valid, tmp_path_factory, data):
+    folder, content = valid
+    text = json.dumps(data.draw(altered(copy.deepcopy(content)))).encode()
+    opened(folder, tmp_path_factory.getbasetemp() / "altered", text)
+
+
+@tries(40)
+@given(st.data())
+def test_damaged_sessions(valid, tmp_path_factory, data):
+    folder, content = valid
+    text = data.draw(damaged(json.dumps(content).encode()))
+    opened(folder, tmp_path_factory.getbasetemp() / "damaged", text)
