@@ -54,6 +54,7 @@ MEASURES = Measures(
     process_length_m=4.0,
     cycle_time_s=50.0,
     judged_by="the mesh as given (12 triangles)",
+    resolution_m=0.0,
     true_distance_worst_m=0.0012,
     true_distance_99_m=0.0008,
     true_distance_95_m=0.0006,

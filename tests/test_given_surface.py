@@ -86,6 +86,19 @@ def test_the_other_side_of_a_sheet_does_not_count():
     assert given.distance(inside, -DOWN)[0] == pytest.approx(0.001, abs=1e-6)
 
 
+def test_points_tell_how_finely_they_can_tell():
+    assert PointSurface(*board(spacing=0.01)).resolution_m == pytest.approx(0.005, rel=0.1)
+    assert given_surface(cloud_of(Mesh(np.array(BOX.vertices), BOX.faces))).resolution_m == 0.0
+
+
+def test_few_points_on_a_thin_rod_are_a_plane_not_nothing():
+    """Between points 40 mm apart, places on the surface are nearer to it than to any point."""
+    along = np.linspace(0.0, 0.4, 11)
+    points = np.c_[along, np.zeros((11, 2))]
+    given = PointSurface(points, np.tile([0.0, 0.0, 1.0], (11, 1)))
+    assert given.distance(np.array([[0.1, 0.0, 0.001]]), DOWN)[0] == pytest.approx(1e-3, abs=1e-6)
+
+
 def test_a_place_beyond_the_edge_or_in_the_air_is_off():
     """In the plane of the board, a hand's breadth beside it."""
     points, normals = board()

@@ -55,6 +55,13 @@ def test_what_a_person_should_look_at_is_said(change, message):
     assert line.startswith("region 'top', sand: ") and message in line
 
 
+def test_a_cloud_cannot_tell_less_than_half_the_distance_between_its_points():
+    coarse = replace(MEASURES, true_distance_99_m=0.003, resolution_m=0.006)
+    assert report_of(made_up(measures=coarse), Limits())["warnings"] == []
+    fine = replace(coarse, resolution_m=0.002)
+    assert len(report_of(made_up(measures=fine), Limits())["warnings"]) == 1
+
+
 def test_what_the_plan_says_of_itself_is_no_warning_where_the_object_is_known():
     fine = replace(MEASURES, surface_distance_99_m=0.003)
     assert report_of(made_up(measures=fine), Limits())["warnings"] == []

@@ -82,7 +82,8 @@ class Measures:
     surface_distance_*: of the process waypoints from the smooth surface that they were planned on,
     at the stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on
     the surface that are worked, along the lines and between waypoints too, from the object as it
-    was given (`nrdf.process.given_surface`), which judged_by names; None where that is not known.
+    was given (`nrdf.process.given_surface`), which judged_by names; less than resolution_m it
+    cannot tell. None where it is not known.
 
     axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
     step_worst_m, turn_worst_rad, bend_worst_rad_m: the largest step between neighbouring waypoints
@@ -110,6 +111,7 @@ class Measures:
     process_length_m: float
     cycle_time_s: float
     judged_by: str | None = None
+    resolution_m: float | None = None
     true_distance_worst_m: float | None = None
     true_distance_99_m: float | None = None
     true_distance_95_m: float | None = None
@@ -171,6 +173,7 @@ def measure(
     return replace(
         made,
         judged_by=given.name,
+        resolution_m=given.resolution_m,
         true_distance_worst_m=float(away.max()),
         true_distance_99_m=float(np.quantile(away, 0.99)),
         true_distance_95_m=float(np.quantile(away, 0.95)),

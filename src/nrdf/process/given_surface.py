@@ -21,15 +21,20 @@ from nrdf.process.surface import quadrics, tangent_frames, unit
 _NEIGHBOURS, _LEAST = 24, 6  # points that tell the surface between them
 _FACING, _ALIKE = 0.2, 0.7  # cosines: to the tool's axis; between normals of one sheet
 _SPACING_BY = 7  # the neighbour that tells how far apart points are
-_GAP = 2.0  # spacings to the next point within which the surface is taken to go on
+_GAP = 1.5  # spacings to the next point within which the surface is taken to go on
 _CHUNK = 1 << 14
+_ASKED = 500  # points that tell the spacing of all
 _LEAST_AREA = 1e-14  # of a face, in squares of the mesh's longest side
 
 
 class GivenSurface(Protocol):
-    """name: what distances are measured to, in words."""
+    """name: what distances are measured to, in words. resolution_m: distances below say nothing:
+    0 for a mesh, half of the distance between a cloud's points."""
 
     name: str
+
+    @property
+    def resolution_m(self) -> float: ...
 
     def distance(self, places: np.ndarray, axes: np.ndarray) -> np.ndarray:
         """Distances (m,), m, of places (m, 3) where a tool with z at axes (m, 3), unit, works."""
@@ -80,6 +85,7 @@ class MeshSurface:
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
         self.name = f"the mesh as given ({len(faces)} triangles)"
+        self.resolution_m = 0.0
         self._origin = vertices.mean(axis=0)
         self._scale = float(np.ptp(vertices, axis=0).max())
         self._vertices = np.ascontiguousarray((vertices - self._origin) / self._scale)
@@ -117,8 +123,13 @@ class PointSurface:
     def _tree(self) -> cKDTree:
         return cKDTree(self._points)
 
+    @cached_property
+    def resolution_m(self) -> float:
+        some = np.linspace(0, len(self._points) - 1, _ASKED).astype(int)
+        return 0.5 * float(np.median(self._spacing_at(some)))
+
     def distance(self, places: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        """Distances (m,), m; to the nearest point where there are too few for a surface."""
+        """Distances (m,), m; to the nearest point where none around faces the tool."""
         parts = [np.zeros(0)]
         for start in range(0, len(places), _CHUNK):
             part = slice(start, start + _CHUNK)
@@ -144,11 +155,15 @@ class PointSurface:
         turned = offset @ frame.transpose(0, 2, 1)
         spacing = self._spacing_at(near[row, first])
         scaled = turned[..., :2] / spacing[:, None, None]
-        height = np.abs(quadrics(scaled, turned[..., 2:], weight)[:, 0, 0])
+        height = quadrics(scaled, turned[..., 2:], weight)[:, 0, 0]
+        # Of few, as on thin parts, a plane: as their normals have it.
+        total = np.maximum(weight.sum(axis=1), 1e-12)
+        plane = (weight * turned[..., 2]).sum(axis=1) / total
+        height = np.abs(np.where(sheet.sum(axis=1) >= _LEAST, height, plane))
         sideways = np.linalg.norm(turned[row, first, :2], axis=1)
         beyond = np.maximum(sideways - _GAP * spacing, 0.0)
         fitted = np.minimum(np.hypot(height, beyond), nearest)
-        return np.asarray(np.where(sheet.sum(axis=1) >= _LEAST, fitted, nearest))
+        return np.asarray(np.where(facing.any(axis=1), fitted, nearest))
 
     def _spacing_at(self, index: np.ndarray) -> np.ndarray:
         """The distance (m,), m, between points around those at `index` (m,)."""

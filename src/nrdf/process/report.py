@@ -155,7 +155,7 @@ def measure_warnings(process: Process, measures: Measures) -> list[str]:
 def _distance_warnings(process: Process, measures: Measures) -> list[str]:
     """By the object as it was given, where that is known: the plan cannot judge itself."""
     planned, true = measures.surface_distance_99_m, measures.true_distance_99_m
-    if true is not None and true > _FARTHEST_M:
+    if true is not None and true > max(_FARTHEST_M, measures.resolution_m or 0.0):
         away = in_words("_m", true)
         return [f"1 % of the way on the surface is more than {away} off {measures.judged_by}"]
     if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
