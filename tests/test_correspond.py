@@ -114,14 +114,24 @@ def test_templates_may_come_from_one_folder_only(folder, tmp_path):
     write_folder(other, [Ball(f"other-{i}") for i in range(2)], 0)
     report = correspond_folders([folder, other], 2, 1, SETTINGS, templates_from=other)
     assert set(report.templates) == {"other-0", "other-1"} and report.done == 8
-    with pytest.raises(DataError, match=r"3 templates cannot be chosen out of the 2 .*others"):
-        correspond_folders([folder, other], 3, 1, SETTINGS, templates_from=other)
 
 
-@pytest.mark.parametrize("templates", [0, 5])
-def test_more_templates_than_training_shapes_are_refused(folder, templates):
-    with pytest.raises(DataError, match=f"{templates} templates .* the 4 training shapes in .*"):
-        correspond_folders([folder], templates, 1, SETTINGS)
+def test_where_there_are_fewer_shapes_than_templates_all_of_them_serve(folder, tmp_path, caplog):
+    report = correspond_folders([folder], 12, 1, SETTINGS)
+    assert set(report.templates) == {"ball-0", "ball-1", "ball-2", "ball-3"} and report.done == 6
+    (said,) = caplog.messages
+    assert said.startswith("12 templates were asked for; the 4 training shapes in ")
+    assert correspond_folders([folder], 4, 1, SETTINGS).skipped == 6  # the same ones
+    other = tmp_path / "others"
+    other.mkdir()
+    write_folder(other, [Ball(f"other-{i}") for i in range(2)], 0)
+    report = correspond_folders([folder], 3, 1, SETTINGS, templates_from=other)
+    assert set(report.templates) == {"other-0", "other-1"}
+
+
+def test_no_templates_at_all_are_refused(folder):
+    with pytest.raises(DataError, match="0 templates are none; give 1 or more"):
+        correspond_folders([folder], 0, 1, SETTINGS)
 
 
 def test_without_training_shapes_there_is_nothing_to_do(folder):

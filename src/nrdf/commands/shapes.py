@@ -136,7 +136,7 @@ def correspond(
 
     Args:
         data: Data folders of one category (of `nrdf prepare` or `nrdf synth`).
-        templates: Number of shapes that serve as templates.
+        templates: Number of shapes that serve as templates; all shapes where there are fewer.
         templates_from: The folder whose shapes may serve as templates; all of them unless given.
             Boxes, for instance, are good to learn from and poor as templates.
         meshes: Folder of the meshes that the first data folder was prepared from: those that share

@@ -89,7 +89,7 @@ class Usual:
 
 Name = Annotated[str, Field(max_length=200), AfterValidator(_name)]
 # Strict, because YAML's yes and no would count as 1 and 0.
-Number = Annotated[float, Field(strict=True)]
+Number = Annotated[float, Field(strict=True, ge=-1e9, le=1e9)]
 Coordinate = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]

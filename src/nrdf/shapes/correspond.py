@@ -9,6 +9,7 @@ the distance left between the moved template and the shape.
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,6 +29,8 @@ from nrdf.shapes.dataset import (
 )
 from nrdf.shapes.pool import each
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
+
+log = logging.getLogger(__name__)
 
 TEMPLATE_POINTS = 1024
 TARGET_POINTS = 2048
@@ -56,23 +59,25 @@ def correspond_folders(
 ) -> CorrespondReport:
     """Add the groups `template-*` to every train and val shape of data folders (of one category).
 
-    Templates are chosen out of the train shapes of all folders, or of `templates_from` alone.
+    Templates are chosen out of the train shapes of all folders, or of `templates_from` alone; where
+    there are fewer than asked for, all of them serve, with a warning.
 
     Shapes that have them already, from the same templates and settings, are kept: an interrupted
     run goes on. `progress` is told (done, all). A worker needs about 70 MB a template. Raises
-    DataError with fewer training shapes than templates, or a shape file that cannot be read.
+    DataError without training shapes or templates, or for a shape file that cannot be read.
     """
     settings = settings or RegistrationSettings()
     train = [path for folder in folders for path in shape_paths(folder, "train")]
     eligible = train if templates_from is None else shape_paths(templates_from, "train")
-    if not 1 <= templates <= len(eligible):
-        where = ", ".join(map(str, folders if templates_from is None else [templates_from]))
-        if not eligible:
-            raise DataError(f"no training shapes in {where or 'no folder'}: nothing to register")
-        raise DataError(
-            f"{templates} templates cannot be chosen out of the {len(eligible)} training shapes in "
-            f"{where}; give 1 to {len(eligible)}"
-        )
+    where = ", ".join(map(str, folders if templates_from is None else [templates_from]))
+    if not eligible:
+        raise DataError(f"no training shapes in {where or 'no folder'}: nothing to register")
+    if templates < 1:
+        raise DataError(f"{templates} templates are none; give 1 or more")
+    if templates > len(eligible):
+        have = f"{len(eligible)} training shapes in {where}"
+        log.warning("%d templates were asked for; the %s all serve", templates, have)
+    templates = min(templates, len(eligible))
     shapes = [read_shape(path) for path in eligible]
     chosen = choose_templates(shapes, templates)
     names = [shapes[index].name for index in chosen]
