@@ -107,7 +107,7 @@ def test_bounds(bounds, good, bad, words):
 def test_bounds_are_found_within_annotations():
     hints = {"share": Share | None, "pair": tuple[Annotated[float, Within(0.0)], float]}
     check_numbers({"share": None, "pair": (1.0, 2.0), "flag": True, "name": "nan"}, hints)
-    for wrong in ({"share": 2.0}, {"pair": (1.0, -1.0)}, {"unknown": NAN}):
+    for wrong in ({"share": 2.0}, {"pair": (1.0, -1.0)}, {"unknown": NAN}, {"unknown": -1}):
         with pytest.raises(ConfigError):
             check_numbers(wrong, hints)
     for count, hint in ((0, Count), (-1, Seed)):

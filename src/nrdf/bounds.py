@@ -55,14 +55,15 @@ Seed = Annotated[int, FROM_ZERO]
 def check_numbers(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
     """Check every number among `values`, those in tuples too, by its `Within` in the annotations.
 
-    Numbers without one must be finite. Raises ConfigError, with name and value, for the first that
-    is not.
+    Without one, whole numbers must be 0 or more, others finite. Raises ConfigError, with name and
+    value, for the first that is not.
     """
     for name, value in values.items():
-        bounds = next(_bounds_in(hints.get(name)), FINITE)
+        bounds = next(_bounds_in(hints.get(name)), None)
         for number in value if isinstance(value, tuple) else (value,):
             if isinstance(number, (int, float)) and not isinstance(number, bool):
-                bounds.check(name, number)
+                usual = FROM_ZERO if isinstance(number, int) else FINITE
+                (bounds or usual).check(name, number)
 
 
 def _bounds_in(hint: Any) -> Iterator[Within]:
