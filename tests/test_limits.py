@@ -83,13 +83,13 @@ def test_what_is_doubtful_is_said(transferred, message):
 
 
 def test_a_region_that_may_be_there_is_doubtful():
-    for presence in (absent(0.6), Presence(NOT_OBSERVED, 0.95, 0.0)):
+    for presence in (absent(0.6), Presence(NOT_OBSERVED, 0.95, 0.0, 0.0)):
         skipped = with_match(made_up(missing="skipped"), presence=presence)
         assert doubts_of(skipped) == ["region 'top': perhaps there all the same: skipped"]
 
 
 def absent(confidence):
-    return Presence(ABSENT, confidence, 0.5)
+    return Presence(ABSENT, confidence, 1 - confidence, 0.5)
 
 
 def with_match(transferred, **changes):
