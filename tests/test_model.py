@@ -12,7 +12,8 @@ from nrdf.errors import CloudError, RegionError
 from nrdf.field import build_field
 from nrdf.process.transfer import MIN_CONFIDENCE
 from nrdf.regions.embedded import encoder_subset
-from nrdf.regions.model import WORKING_POINTS, Model, Taught
+from nrdf.regions.model import WORKING_POINTS, Model
+from nrdf.regions.taught import Taught
 from nrdf.shapes.families import get_family
 from nrdf.similarity import Similarity, about_up, up_axis, upright
 from solids import box

@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from nrdf.process.knowledge import Knowledge
     from nrdf.process.transfer import Teacher, Transferred
     from nrdf.regions.match import Match
-    from nrdf.regions.model import Model, Taught
+    from nrdf.regions.model import Model
+    from nrdf.regions.taught import Taught
     from nrdf.scans.target import align
 
 __all__ = [
@@ -73,7 +74,8 @@ _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
     "as_cloud": "nrdf.inputs",
     "Match": "nrdf.regions.match",
-    **dict.fromkeys(("Model", "Taught"), "nrdf.regions.model"),
+    "Model": "nrdf.regions.model",
+    "Taught": "nrdf.regions.taught",
     **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     "align": "nrdf.scans.target",

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from nrdf.cloud import PointCloud
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
-from nrdf.regions.model import Model, Taught
+from nrdf.regions.model import Model
+from nrdf.regions.taught import Taught
 
 
 class FieldMatch:

@@ -13,7 +13,9 @@ from nrdf.geometry import thin
 from nrdf.process.surface import SAME_SIDE, Surface, unit
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.embedded import Embedded
-from nrdf.regions.model import Mapped, Model, Taught
+from nrdf.regions.match import Mapped
+from nrdf.regions.model import Model
+from nrdf.regions.taught import Taught
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
 

@@ -20,7 +20,8 @@ from nrdf.studio.teaching import lesson_of, process_of
 from nrdf.studio.worker import Progress
 
 if TYPE_CHECKING:
-    from nrdf.regions.model import Model, Taught
+    from nrdf.regions.model import Model
+    from nrdf.regions.taught import Taught
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Described:
-    """What the descriptors of several objects say, by `nrdf.regions.model.Taught.described`."""
+    """What the descriptors of several objects say, by `nrdf.regions.taught.Taught.described`."""
 
     objects: Mapping[str, tuple[Taught, np.ndarray]]
 
