@@ -56,7 +56,7 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     found = bring_in(judge("chair"), scan.cloud, UP, unit="mm")
     assert yaw_error(found.alignment.best.pose, PLACE) < 5
     assert found.alignment.best.pose.scale == pytest.approx(900, rel=0.03)
-    assert found.unit.name == "mm" and found.fits and found.doubts == []
+    assert found.unit.name == "mm" and found.kind.fits and found.doubts == []
     wrong = replace(found, unit=find_unit("m", 900, "chair"))
     assert ["the unit may be wrong: 900 m" in doubt for doubt in wrong.doubts] == [True]
     two = replace(found, cleaned=replace(found.cleaned, others=1))
@@ -135,11 +135,11 @@ def test_a_stool_that_looks_alike_from_all_sides_is_ambiguous():
 def test_a_car_is_no_chair():
     car = PointCloud(full("car", CHAIR).points)
     found = bring_in(judge("chair"), car, up_axis("y"))
-    assert not found.fits
+    assert not found.kind.fits
     assert any("does not look like a chair" in doubt for doubt in found.doubts)
-    assert bring_in(judge("car"), car, up_axis("y")).fits
+    assert bring_in(judge("car"), car, up_axis("y")).kind.fits
     chair = PointCloud(full("chair", CHAIR).points)
-    assert not bring_in(judge("car"), chair, up_axis("y")).fits
+    assert not bring_in(judge("car"), chair, up_axis("y")).kind.fits
 
 
 class Facing:

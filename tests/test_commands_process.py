@@ -36,9 +36,9 @@ def taught(files):
     return files
 
 
-def transfer(files, model, *more):
+def transfer(files, model, *more, kind="--any-kind"):
     words = f"transfer {files}/box.yaml --model {model} --target {files}/new.ply --out {files}/job"
-    return cli.run([*words.split(), *more])
+    return cli.run([*words.split(), *([kind] if kind else []), *more])
 
 
 def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
@@ -49,7 +49,9 @@ def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
     said = capsys.readouterr().out
     assert "2 tool paths" in said and "top" in said and "oil" in said
     report = json.loads((taught / "job" / "report.json").read_text())
-    assert report["limits"]["set"] == {"min_coverage": 0.5, "require_all": True}
+    assert report["limits"]["set"] == {
+        "min_coverage": 0.5, "require_all": True, "any_kind": True,
+    }  # fmt: skip
     assert report["model"]["category"] == "chair" and report["versions"]["nrdf"]
     job = read_job(taught / "job")
     assert job.frame == "cell" and [path.process for path in job.paths] == ["sand", "oil"]
@@ -114,6 +116,18 @@ def test_a_limit_that_is_not_met_ends_with_3_after_writing(taught, untrained, ca
     report = json.loads((taught / "job" / "report.json").read_text())
     assert len(report["limits"]["not_met"]) == 3
     assert (taught / "job" / "toolpaths.json").exists()
+
+
+def test_a_box_is_no_chair_and_ends_with_3_after_writing(taught, untrained, capsys):
+    assert transfer(taught, untrained, kind=None) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the target does not look like a chair" in said and "--any-kind" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert not report["kind"]["fits"] and report["kind"]["warnings"][0] in report["doubts"]
+    assert report["kind"]["warnings"][0] in report["warnings"]
+    assert (taught / "job" / "toolpaths.json").exists()
+    assert transfer(taught, untrained, "--overwrite") == 0
+    assert "the target does not look like a chair" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_region_without_enough_confidence_is_skipped(taught, untrained, capsys):

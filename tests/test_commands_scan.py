@@ -152,7 +152,7 @@ def test_a_real_scan_goes_through(files, tmp_path):
                ) == 0  # fmt: skip
     report = json.loads((out / "report.json").read_text())
     best = similarity(report["alignment"])
-    assert 0.65 < best.scale < 0.75 and report["alignment"]["fits"]
+    assert 0.65 < best.scale < 0.75 and report["alignment"]["kind"]["fits"]
     assert report["alignment"]["probability"] > 0.9 and report["alignment"]["doubts"] == []
     seat, back, leg = (
         best.to_canonical(read_cloud(out / f"{name}.ply").points)

@@ -17,9 +17,10 @@ from nrdf.field.zoo import add_to_zoo, list_models
 from nrdf.locks import claim
 from nrdf.shapes.dataset import IndexRow, Shape, write_index, write_shape
 from nrdf.similarity import LEFT_FOR_RIGHT, about_up
-from nrdf.training import yaw as training
+from nrdf.training import small
 from nrdf.training.provenance import Entry, list_shapes
-from nrdf.training.yaw import CAMERAS, YawSettings, draw, load_views, loss_of, train_yaw
+from nrdf.training.scanned import CAMERAS, load_views, split
+from nrdf.training.yaw import YawSettings, draw, loss_of, train_yaw
 
 FEW = YawSettings(steps=12, batch=8)
 MORE = YawSettings(steps=100, batch=16, rate=5e-3)
@@ -126,15 +127,15 @@ def test_bins_beside_the_right_one_are_nearly_right():
 
 
 def test_the_test_split_and_every_tenth_shape_are_left_out(folder):
-    kept, held = training.split(list_shapes([folder]))
+    kept, held = split(list_shapes([folder]))
     assert [e.path.stem for e in held] == ["step-09"]
     assert len(kept) == 10 and all(e.split == "train" for e in kept)
     rows = [Entry(folder / "a.npz", "s", split, "") for split in ("val", "test", "train")]
-    assert [[e.split for e in part] for part in training.split(rows)] == [["train"], ["val"]]
+    assert [[e.split for e in part] for part in split(rows)] == [["train"], ["val"]]
 
 
 def test_training_goes_on_where_it_was_killed(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(training, "CHECKPOINT_EVERY", 5)
+    monkeypatch.setattr(small, "CHECKPOINT_EVERY", 5)
 
     def kill(done: int, total: int) -> None:
         if done == 8:

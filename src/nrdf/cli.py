@@ -34,6 +34,7 @@ RESUMABLE = (
     "correspond",
     "train",
     "yaw",
+    "kind",
     "eval bsrc",
     "eval presence",
     "ablate",
@@ -49,6 +50,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.export import export
     from nrdf.commands.information import info, zoo
+    from nrdf.commands.kind import kind
     from nrdf.commands.knowledge import knowledge
     from nrdf.commands.retrieve import retrieve
     from nrdf.commands.scan import scan
@@ -77,6 +79,7 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "correspond": correspond,
         "train": train,
         "yaw": yaw,
+        "kind": kind,
         "zoo": zoo,
         "eval": evaluations,
         "ablate": ablate,

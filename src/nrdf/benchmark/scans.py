@@ -161,7 +161,7 @@ def score_pose(judge: Judge, item: Item, kind: str) -> PoseFigure:
 def is_doubted(found: AlignedScan) -> bool:
     """Whether the pose is reported as ambiguous, rough or a poor fit."""
     alignment = found.alignment
-    return alignment.is_ambiguous or alignment.best.symmetry == 0 or not found.fits
+    return alignment.is_ambiguous or alignment.best.symmetry == 0 or not found.kind.fits
 
 
 def pose_error(found: AlignedScan, true: Similarity) -> tuple[float, float]:

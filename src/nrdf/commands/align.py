@@ -143,7 +143,12 @@ def warn_of_doubts(found: AlignedScan, path: Path) -> None:
     """Log every doubt about a scan as a warning, and a guess of its unit."""
     if found.unit.origin == "guessed":
         log.info("%s: the unit is guessed to be %s", path, found.unit.name)
-    for doubt in found.doubts:
+    warn_of(found.doubts, path)
+
+
+def warn_of(doubts: Sequence[str], path: Path) -> None:
+    """Log doubts about a file as warnings."""
+    for doubt in doubts:
         log.warning("%s: %s", path, doubt)
 
 
@@ -160,8 +165,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "cost": round(best.cost, 4),
         "field_cost": round(best.field_cost, 4),
         "usual_cost": round(found.judge.usual_cost, 4),
-        "strangeness": round(found.strangeness, 3),
-        "fits": found.fits,
+        "kind": found.kind.describe(),
         "doubts": found.doubts,
         "unit": {"name": unit.name, "origin": unit.origin},
         "sensors": None if sensors is None else sensors,

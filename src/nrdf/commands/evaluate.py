@@ -34,6 +34,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
     from nrdf.commands.evaluate_carry import carry
+    from nrdf.commands.evaluate_kind import kind
     from nrdf.commands.evaluate_objects import objects
     from nrdf.commands.evaluate_presence import presence
     from nrdf.commands.evaluate_scans import scans
@@ -46,6 +47,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
         "families": families,
         "carry": carry,
         "scans": scans,
+        "kind": kind,
         "presence": presence,
         "toolpaths": toolpaths,
         "shape": shape,

@@ -54,6 +54,7 @@ def gather() -> dict[str, Any]:
     """Versions, devices and models as plain values."""
     import torch
 
+    from nrdf.field.kind import KIND_ZOO
     from nrdf.field.yaw import YAW_ZOO
     from nrdf.field.zoo import list_models
 
@@ -62,7 +63,8 @@ def gather() -> dict[str, Any]:
         memory = torch.cuda.get_device_properties(i).total_memory
         devices[f"cuda:{i}"] = f"{torch.cuda.get_device_name(i)}, {memory / 2**30:.0f} GiB"
     entries = [(entry.name, entry) for entry in list_models()]
-    entries += [(f"{entry.name}, yaw", entry) for entry in list_models(YAW_ZOO)]
+    for zoo in (YAW_ZOO, KIND_ZOO):
+        entries += [(f"{entry.name}, {entry.preset}", entry) for entry in list_models(zoo)]
     models = [
         {
             "name": name,
@@ -92,7 +94,7 @@ def zoo(
     scores: tuple[str, ...] = (),
     note: str = "",
 ) -> None:
-    """Add a trained field, or what tells yaw, to the zoo of this checkout.
+    """Add a trained field, or what tells yaw or kind, to the zoo of this checkout.
 
     Files over 8 MB are refused. The index gets the checksum, and from the file preset, training
     shapes with licences, commit and date.

@@ -14,6 +14,7 @@ from nrdf.commands.align import (
     describe_alignment,
     read_scan,
     stand_ins,
+    warn_of,
     warn_of_doubts,
 )
 from nrdf.commands.console import (
@@ -90,7 +91,8 @@ def retrieve(
         skip: Steps of cleaning the scan to leave out.
         topic: What to read of a ROS 2 bag that has clouds under several topics.
         device: cpu, cuda, cuda:N or auto.
-        strict: End with 3 where there is any doubt about the scan's pose.
+        strict: End with 3 where there is any doubt about the target: its kind, how it stands, a
+            scan's pose.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.output import output_folder
@@ -107,8 +109,8 @@ def retrieve(
         reference_cloud = nrdf.read_cloud(reference)
         scan = None
         if up is None:
-            if sensor or unit or skip or strict:
-                raise CloudError("--sensor, --unit, --skip and --strict are for scans: give --up")
+            if sensor or unit or skip:
+                raise CloudError("--sensor, --unit and --skip are for scans: give --up")
             target_cloud = nrdf.read_cloud(target, topic=topic)
         else:
             examples = stand_ins(loaded, reference_cloud)
@@ -120,7 +122,11 @@ def retrieve(
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
         embedded = loaded.embed(target_cloud) if scan is None else scan.embed()
-        matches = taught.retrieve_all(regions, embedded, method, refine)
+        kind = taught.check_kind(embedded) if scan is None else scan.kind
+        if scan is None:
+            doubts = list(kind.warnings)
+            warn_of(doubts, target)
+        matches = taught.retrieve_all(regions, embedded, method, refine, check=False)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
         panels = [
@@ -140,6 +146,7 @@ def retrieve(
             "reference": describe_cloud(reference, reference_cloud),
             "target": describe_cloud(target, target_cloud),
             "coordinates": "the target file's own frame and unit",
+            "kind": kind.describe(),
             **({} if scan is None else {"alignment": describe_alignment(scan)}),
             "regions": describe_matches(matches, target_cloud),
             "seconds": {**clock.seconds, "of the target": embedded.seconds},

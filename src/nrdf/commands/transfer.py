@@ -40,6 +40,7 @@ def transfer(
     max_turn_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
     max_cycle_time_s: NotNegative | None = None,
     require_all: bool = False,
+    any_kind: bool = False,
     strict: bool = False,
     device: str = "cpu",
     overwrite: bool = False,
@@ -50,7 +51,8 @@ def transfer(
     target.ply and regions/ (in metres), toolpaths.json (for `nrdf export`), report.json,
     report.html (opens without a network) and picture.png. A region that the new object lacks is
     reported and skipped. Ends, after writing, with 4 where no tool path could be planned, and
-    with 3 where a limit that is set is not met.
+    with 3 where a limit that is set is not met, or the target looks like another kind of object,
+    or one that lies or faces elsewhere.
 
     Example: nrdf transfer chair.yaml --target new.ply --out job/ --min-coverage 0.98
 
@@ -78,6 +80,8 @@ def transfer(
         max_turn_deg: Limit on the turn of the tool's axis between neighbouring waypoints of a line.
         max_cycle_time_s: Limit on the time of all tool paths together.
         require_all: Limit: every process of every region must have a tool path.
+        any_kind: Take a target that does not look like the knowledge's kind of object, upright and
+            facing +X, with a warning; without, it is a limit that is not met.
         strict: Limit: nothing may be doubtful about the target's pose, unit and kind, and about
             its regions, absent ones included.
         device: cpu, cuda, cuda:N or auto.
@@ -98,6 +102,7 @@ def transfer(
         max_turn_rad=_scaled(max_turn_deg, math.pi / 180),
         max_cycle_time_s=max_cycle_time_s,
         require_all=require_all,
+        any_kind=any_kind,
     )
     if up is None and (sensor or skip):
         raise CloudError("--sensor and --skip are for scans: give --up")
@@ -127,7 +132,10 @@ def transfer(
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
             given, said, whole = (cloud, known, None) if scan is None else _of_scan(scan, known)
-            transferred = teacher.transfer(given, said, least, marked, doubts=doubts, whole=whole)
+            kind = None if scan is None else scan.kind
+            transferred = teacher.transfer(
+                given, said, least, marked, doubts=doubts, whole=whole, kind=kind
+            )
         origin = {
             "command": command_line(),
             "knowledge": str(knowledge),

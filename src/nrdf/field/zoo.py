@@ -32,6 +32,10 @@ LARGEST = 8_000_000
 """Bytes that a weight file in the zoo may have."""
 YAW = "yaw"
 """Preset of what tells yaw (`nrdf.field.yaw`): no field, so it has a folder and an index below."""
+KIND = "kind"
+"""Preset of what tells the kind of object (`nrdf.field.kind`), likewise."""
+KIND = "kind"
+"""Preset of what tells the kind of object (`nrdf.field.kind`), likewise."""
 WEIGHTS = "weights.safetensors"
 """What a finished training run calls its weight file."""
 
@@ -126,7 +130,7 @@ def add_to_zoo(
 ) -> ZooEntry:
     """Copy a weight file into the zoo and enter it into the index, replacing one of that name.
 
-    What tells yaw goes into the zoo's folder `yaw`.
+    What tells yaw or kind goes into the zoo's folder `yaw` or `kind`.
 
     `name` is the category unless given; `scores` are added to those in the file. Raises ModelError
     for a file that is damaged or larger than 8 MB, OutputError if the zoo cannot be written.
@@ -139,8 +143,8 @@ def add_to_zoo(
             f"{path} has {size / 1e6:.1f} MB; the zoo takes at most {LARGEST / 1e6:.0f} MB: "
             "train a smaller field"
         )
-    if metadata["preset"] == YAW:
-        zoo = zoo / YAW
+    if metadata["preset"] in (YAW, KIND):
+        zoo = zoo / metadata["preset"]
     name = name or str(metadata["category"])
     fault = file_name_fault(name) or (
         ""

@@ -23,7 +23,9 @@ def doubts_of(transferred: Transferred) -> list[str]:
     not absent beyond doubt. `nrdf transfer --strict` takes none of this.
     """
     regions = ((n, _doubt(region)) for n, region in transferred.regions.items())
-    return [*transferred.doubts, *(f"region '{n}': {doubt}" for n, doubt in regions if doubt)]
+    kind = () if transferred.kind is None else transferred.kind.warnings
+    about = dict.fromkeys((*transferred.doubts, *kind))  # an aligned scan's doubts hold its kind's
+    return [*about, *(f"region '{n}': {doubt}" for n, doubt in regions if doubt)]
 
 
 def _doubt(region: FoundRegion) -> str:
@@ -40,6 +42,9 @@ def _doubt(region: FoundRegion) -> str:
 class Limits:
     """None where there is no limit. SI, of each tool path; the cycle time is that of all.
 
+    any_kind: whether the target may look like something else than the knowledge's kind of object,
+    or stand otherwise; that limit is there unless it is lifted.
+
     The coverage is that of the whole region that was found. The distance is that from the object
     as it was given; from the surface planned on where nothing else is known.
 
@@ -54,6 +59,7 @@ class Limits:
     max_turn_rad: float | None = None
     max_cycle_time_s: float | None = None
     require_all: bool = False
+    any_kind: bool = False
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -63,6 +69,8 @@ class Limits:
     def broken(self, transferred: Transferred) -> list[str]:
         """A line for each limit that is not met: by which region and process, and by how much."""
         lines = []
+        if transferred.kind is not None and not self.any_kind:
+            lines += [f"{w} (--any-kind: take it all the same)" for w in transferred.kind.warnings]
         for step in transferred.paths:
             where = f"region '{step.region}', {step.process.label}"
             if step.measures is None:

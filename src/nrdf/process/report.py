@@ -63,6 +63,7 @@ def report_of(transferred: Transferred, limits: Limits) -> dict[str, Any]:
         },
         "warnings": warnings,
         "doubts": doubts,
+        "kind": None if transferred.kind is None else transferred.kind.describe(),
         "limits": {
             "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
             "not_met": limits.broken(transferred),

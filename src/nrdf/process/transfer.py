@@ -41,6 +41,7 @@ from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
+from nrdf.scans.kind import KindCheck
 from nrdf.similarity import Similarity
 from nrdf.units import in_words
 
@@ -86,8 +87,8 @@ class Transferred:
 
     target: with normals, estimated where its file had none. seconds: time by phase. pose: from
     canonical coordinates to the target's: how the object lies there. doubts: what is doubtful
-    about the object as a whole: its pose, its unit, whether it is of that kind at all; those about
-    regions are added by `nrdf.process.limits.doubts_of`.
+    about the object's pose and unit. kind: what it looks like. What is doubtful altogether:
+    `nrdf.process.limits.doubts_of`.
     """
 
     lesson: Lesson
@@ -98,6 +99,7 @@ class Transferred:
     seconds: dict[str, float]
     pose: Similarity | None = None
     doubts: tuple[str, ...] = ()
+    kind: KindCheck | None = None
 
     def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
         """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
@@ -139,6 +141,7 @@ class Teacher:
         progress: Callable[[int, int], None] | None = None,
         doubts: Sequence[str] | None = None,
         whole: PointCloud | None = None,
+        kind: KindCheck | None = None,
     ) -> Transferred:
         """Find the regions on a target, and bring every process there.
 
@@ -151,25 +154,29 @@ class Teacher:
         are, and a mask that is False everywhere says that the region is not there. `progress` is
         told (done, all) steps. doubts: what is doubtful about the target's pose and unit; unless
         given, its unit is judged here, and logged as a warning where it is doubtful. whole: the
-        target before it was thinned, in metres, by which tool paths are judged. Raises
+        target before it was thinned, in metres, by which tool paths are judged. kind: what the
+        target was found to look like; it is checked here unless given. Raises
         CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
         RegionError for a marked region that is not taught or not on the target, ConfigError for a
         `min_confidence` that is no share.
         """
         SHARE.check("min_confidence", min_confidence)
         start = time.perf_counter()
+        doubted: Sequence[str] = ()
         if isinstance(target, Embedded):
             embedded = self.taught.facing(self.lesson.regions, target)
         else:
             target = as_cloud(target, "the target")
             category = self.lesson.knowledge.category
             known, doubted = unit_and_doubts(target, unit, category, "the target", "unit")
-            if doubts is None:
-                doubts = doubted
-                for doubt in doubted:
-                    log.warning("%s", doubt)
             embedded = self.model.embed(in_metres(target, known))
-        matches = self.taught.retrieve_all(self.lesson.regions, embedded)
+        if kind is None:
+            kind = self.taught.check_kind(embedded)
+        if doubts is None:
+            doubts = doubted
+            for doubt in (*doubted, *kind.warnings):
+                log.warning("%s", doubt)
+        matches = self.taught.retrieve_all(self.lesson.regions, embedded, check=False)
         matches |= self._marked(marked or {}, matches, embedded.cloud)
         found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
         seconds = {"regions": time.perf_counter() - start}
@@ -197,10 +204,8 @@ class Teacher:
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        made, pose = tuple(paths), embedded.pose
-        return Transferred(
-            self.lesson, cloud, found, made, warnings, seconds, pose, tuple(doubts or ())
-        )
+        made, pose, doubtful = tuple(paths), embedded.pose, tuple(doubts)
+        return Transferred(self.lesson, cloud, found, made, warnings, seconds, pose, doubtful, kind)
 
     def _marked(
         self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud

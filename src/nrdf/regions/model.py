@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 
 from nrdf.cloud import check_cloud
 from nrdf.field.base import Field
+from nrdf.field.kind import KindNetwork, find_kind
 from nrdf.geometry import canonical_transform, estimate_normals, thin
 from nrdf.inputs import as_cloud
 from nrdf.regions.embedded import Embedded, encoder_subset
@@ -44,6 +46,12 @@ class Model:
     def preset(self) -> str:
         """Name of the network's preset, such as "default"."""
         return self.field.preset
+
+    @cached_property
+    def kind_network(self) -> KindNetwork | None:
+        """What tells objects of the category from others, and how they are turned; None without
+        one in the zoo."""
+        return find_kind(self.category)
 
     def __repr__(self) -> str:
         return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"

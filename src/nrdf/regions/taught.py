@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,9 +21,13 @@ from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
+from nrdf.scans.kind import KindCheck, check_kind
 
 if TYPE_CHECKING:
     from nrdf.regions.model import Model
+    from nrdf.scans.judge import Judge
+
+log = logging.getLogger(__name__)
 
 METHODS = ("mask", "points")
 _CHUNK = 8192  # points described or inverted at a time
@@ -36,6 +41,17 @@ class Taught:
         self.model = model
         self.reference = reference
         self._k = self._describe(reference.points, reference.normals)
+
+    def check_kind(self, target: Embedded) -> KindCheck:
+        """Whether a target looks like an object of the category, upright and facing forward in the
+        pose that it is embedded in; without a network that tells, like the reference."""
+        return check_kind(self.model, target, lambda: self._judge)
+
+    @cached_property
+    def _judge(self) -> Judge:
+        from nrdf.scans.judge import Judge  # a judge needs models
+
+        return Judge(self.model, [self.reference.cloud])
 
     @cached_property
     def _refiner(self) -> Refiner:
@@ -58,6 +74,7 @@ class Taught:
         method: str = "mask",
         refine: bool = False,
         drop_absent: bool = True,
+        check: bool = True,
     ) -> dict[str, Match]:
         """Find regions on a target, which is embedded and mapped once for all of them.
 
@@ -74,6 +91,8 @@ class Taught:
         (`nrdf.regions.refine`), about half a second a target.
         drop_absent: a region that the target surely lacks, or that was not seen, comes back empty;
         without it, as what was found for it all the same.
+        check: log a warning where the target does not look like an object of the category that
+        stands upright and faces forward (`check_kind`).
 
         Raises RegionError for a region that is empty or not on the reference (the message names
         it) or an unknown method, and CloudError for a target as `Model.embed` does.
@@ -87,6 +106,8 @@ class Taught:
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
         embedded = target if isinstance(target, Embedded) else self._embed(target)
+        for warning in self.check_kind(embedded).warnings if check else ():
+            log.warning("%s", warning)
         surface = self.map_surface(embedded, refine)
         start = time.perf_counter()
         if method == "mask":

@@ -21,7 +21,7 @@ from nrdf.field.base import Inverse
 from nrdf.field.yaw import YawNetwork, find_yaw
 from nrdf.geometry import thin
 from nrdf.regions.association import NORMAL_WEIGHT
-from nrdf.regions.embedded import encoder_subset
+from nrdf.regions.embedded import Embedded, encoder_subset
 from nrdf.regions.model import Model
 from nrdf.shapes.families import FAMILY_NAMES, get_family
 
@@ -93,14 +93,16 @@ class Judge:
         """
         return self._fine(points, normals, whole, whole_normals).mean(axis=1)
 
+    def cost_of(self, target: Embedded) -> float:
+        """The cost of a target in the pose in which it is embedded."""
+        return float(self._each_cost(target).mean())
+
     @cached_property
     def usual_cost(self) -> float:
         """The mean cost of each prototype, judged by the others: what is usual in the category."""
         costs = []
         for number, cloud in enumerate(self._clouds):
-            chosen = sparse_subset(cloud.points, _USUAL_POINTS)
-            points, normals = cloud.points[None, chosen], cloud.normals[None, chosen]
-            each = self._fine(points, normals, points, normals)[0]
+            each = self._each_cost(cloud)
             costs.append(np.delete(each, number).mean() if self.prototypes > 1 else each.mean())
         return float(np.mean(costs))
 
@@ -110,6 +112,12 @@ class Judge:
         known = np.array([_proportions(cloud.points) for cloud in self._clouds])
         spread = np.maximum(known.std(axis=0), _LEAST_SPREAD)
         return float(np.sqrt(np.mean(((_proportions(points) - known.mean(axis=0)) / spread) ** 2)))
+
+    def _each_cost(self, target: Embedded) -> np.ndarray:
+        """The cost of a target by each of the prototypes, (p,)."""
+        chosen = sparse_subset(target.points, _USUAL_POINTS)
+        points, normals = target.points[None, chosen], target.normals[None, chosen]
+        return self._fine(points, normals, points, normals)[0]
 
     def _fine(
         self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray

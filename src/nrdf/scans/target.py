@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from nrdf.cloud import PointCloud, in_metres
+from nrdf.geometry import thin
 from nrdf.inputs import as_cloud
 from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Match
-from nrdf.regions.model import Model
+from nrdf.regions.model import WORKING_POINTS, Model
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan, unthinned
 from nrdf.scans.judge import Judge
+from nrdf.scans.kind import KindCheck, by_judge, by_network
 from nrdf.similarity import Similarity, up_axis
 from nrdf.units import METRES, Unit, find_unit
 
-# On the test shapes, whole and in single views, these tell chairs, cars and aircraft apart.
-_FOREIGN = 0.5  # cost above the usual one from which an object is not of the category
-_STRANGEST = 1.65  # standard deviations of the proportions, likewise
 _ONE_SIDED = (0.5, 0.9)
 """Symmetry between which the field is shown the mirror image too: the plane is trusted, and what
 one of its sides shows the other one lacks."""
@@ -70,16 +70,15 @@ class AlignedScan:
         """A match on the object, its indices those of the scan's points."""
         return replace(match, indices=self.cleaned.kept[match.indices])
 
-    @property
-    def strangeness(self) -> float:
-        """How far the object's proportions are from the category's, in standard deviations."""
-        return self.judge.strangeness(self.pose.to_canonical(self.cleaned.cloud.points))
-
-    @property
-    def fits(self) -> bool:
-        """Whether the object looks like one of the category at all."""
-        explained = self.alignment.best.field_cost < self.judge.usual_cost + _FOREIGN
-        return explained and self.strangeness < _STRANGEST
+    @cached_property
+    def kind(self) -> KindCheck:
+        """Whether the object looks like one of the category, in the likeliest pose."""
+        points = self.cleaned.cloud.points
+        points = points[thin(points, WORKING_POINTS, np.random.default_rng(0))]
+        points, model = self.pose.to_canonical(points), self.judge.model
+        if model.kind_network is None:
+            return by_judge(self.judge, self.alignment.best.field_cost, points)
+        return by_network(model.kind_network, model.category, points, self.pose.rotation)
 
     @property
     def doubts(self) -> list[str]:
@@ -90,13 +89,7 @@ class AlignedScan:
                 f"{self.cleaned.others + 1} objects of comparable size are in view; the largest "
                 "was taken: crop the scan to take another"
             )
-        category, usual = self.judge.model.category, self.judge.usual_cost
-        if not self.fits:
-            found.append(
-                f"the scan does not look like a {category}: the field explains it at a cost of "
-                f"{self.alignment.best.field_cost:.2f}, {usual:.2f} is usual, and its "
-                f"proportions are {self.strangeness:.1f} standard deviations off"
-            )
+        found += self.kind.warnings
         if self.alignment.is_ambiguous:
             degrees = [f"{np.degrees(c.yaw):.0f}°" for c in self.alignment.likely]
             found.append(

@@ -1,0 +1,185 @@
+"""Is this the kind of object, upright, facing forward? Asked once, before any region is looked for.
+
+A network of the category tells (`nrdf.field.kind`). For a category without one it is asked how
+well the field explains the target by what is known of the category (`nrdf.scans.judge`), which says
+less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nrdf.cloud import PointCloud
+from nrdf.field.kind import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
+from nrdf.scans.objects import count_objects
+from nrdf.similarity import AXES, up_axis
+
+if TYPE_CHECKING:
+    from nrdf.regions.embedded import Embedded
+    from nrdf.regions.model import Model
+    from nrdf.scans.judge import Judge
+
+LEAST = 0.3
+"""Probability that an object stands upright and faces forward, below which it is doubted."""
+FOREIGN = 0.5
+"""Cost above the usual one (`nrdf.scans.judge`) from which, without a network, it is doubted."""
+STRANGEST = 1.65
+"""Standard deviations of its proportions from the known objects', likewise."""
+_COUNTED = 2048  # points in which objects are counted
+FITS = "upright and facing forward"
+_SOMETHING_ELSE = "something else"
+
+
+@dataclass(frozen=True)
+class KindCheck:
+    """What a target looks like.
+
+    taken_for: in words; probability: that it is of the category, upright and facing forward, None
+    where nothing tells (a category without a network). warnings: whole sentences for people; none
+    where it fits.
+    """
+
+    category: str
+    taken_for: str
+    probability: float | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def fits(self) -> bool:
+        """Whether nothing speaks against the target."""
+        return not self.warnings
+
+    def describe(self) -> dict[str, Any]:
+        """What a report says of it."""
+        likely = None if self.probability is None else round(self.probability, 4)
+        return {
+            "category": self.category,
+            "fits": self.fits,
+            "taken_for": self.taken_for,
+            "probability": likely,
+            "warnings": list(self.warnings),
+        }
+
+
+def check_kind(model: Model, target: Embedded, judge: Callable[[], Judge]) -> KindCheck:
+    """Check a target that is embedded in the pose in which its regions are to be found.
+
+    judge: gives what is known of the category; it is asked for only without a network.
+    """
+    network = model.kind_network
+    if network is None:
+        judging = judge()
+        return by_judge(judging, judging.cost_of(target), target.points)
+    return check_points(network, model.category, target.points, target.pose.rotation)
+
+
+def check_points(
+    network: KindNetwork, category: str, points: np.ndarray, rotation: np.ndarray
+) -> KindCheck:
+    """Count the objects in canonical points (n, 3), and ask a category's network about them.
+
+    rotation: (3, 3) from canonical coordinates to those of the target's file, in which directions
+    are told.
+    """
+    few = points[np.random.default_rng(0).permutation(len(points))[:_COUNTED]]
+    count = count_objects(PointCloud(few), up_axis("y"))
+    if count == 1:
+        return by_network(network, category, points, rotation)
+    warning = (
+        f"the target holds {count} objects of comparable size; give a cloud of one {category}, or "
+        f"--up {_letter(rotation[:, 1])} to have the largest taken"
+    )
+    return KindCheck(category, f"{count} objects", 0.0, (warning,))
+
+
+def by_network(
+    network: KindNetwork, category: str, points: np.ndarray, rotation: np.ndarray
+) -> KindCheck:
+    """What a category's network says of the canonical points (n, 3) of one object; rotation: as of
+    `check_points`."""
+    order = np.random.default_rng(0).permutation(len(points))
+    likely = network.probabilities(points[order])
+    sure = float(likely[0])
+    if sure >= LEAST:
+        return KindCheck(category, FITS, sure)
+    answer = int(likely[1:].argmax()) + 1
+    # Many answers share what an object of the category may be; together they may outweigh "other".
+    if likely[OTHER] > 0.5:
+        answer = OTHER
+    elif answer == OTHER:
+        answer = int(likely[1:OTHER].argmax()) + 1
+    looks = _in_words(answer, rotation)
+    warning = _warning(category, answer, looks, rotation)
+    return KindCheck(category, looks, sure, (warning,))
+
+
+def _in_words(answer: int, rotation: np.ndarray) -> str:
+    if answer == OTHER:
+        return _SOMETHING_ELSE
+    if answer == TILTED:
+        return "tilted"
+    up = up_of(answer)
+    assert up is not None
+    if answer < ASKEW:
+        forward, _, right = ORIENTATIONS[answer].T
+        if up[1] > 0.5:
+            return f"facing {_axis(rotation @ forward)}"
+        if up[1] < -0.5:
+            return "upside down"
+        if abs(forward[1]) > 0.5:
+            return "lying on its back" if forward[1] > 0 else "lying on its front"
+        return "lying on its left side" if right[1] > 0 else "lying on its right side"
+    if up[1] > 0.5:
+        return "turned by an odd angle"
+    return "upside down" if up[1] < -0.5 else "lying"
+
+
+def _warning(category: str, answer: int, looks: str, rotation: np.ndarray) -> str:
+    """A sentence that says what is seen, and what to do about it."""
+    aligned = not np.allclose(rotation, np.eye(3))
+    unlike = f"the target does not look like a {category}"
+    if answer == OTHER:
+        return (
+            f"{unlike}: it looks like another kind of object, or like a part of one; give a whole "
+            f"{category}, or, if it is one in another pose, --up auto to have it aligned"
+        )
+    standing = f"{unlike} standing upright and facing {_axis(rotation[:, 0])}: it looks like one"
+    up = up_of(answer)
+    if up is None:
+        return f"{standing} that is {looks}; give the direction that points up, as --up x y z"
+    name = _letter(rotation @ up)
+    if up[1] > 0.5 and aligned:
+        return f"{standing} {looks}; look at the picture, or scan more sides"
+    return f"{standing} {looks}; give --up {name} to have it aligned"
+
+
+def _axis(direction: np.ndarray) -> str:
+    """The axis nearest to a direction (3,), such as +X."""
+    name = max(AXES, key=lambda axis: float(up_axis(axis) @ direction)).upper()
+    return name if name.startswith("-") else f"+{name}"
+
+
+def _letter(direction: np.ndarray) -> str:
+    """The axis nearest to a direction (3,), as --up takes it, such as -x."""
+    return _axis(direction).lstrip("+").lower()
+
+
+def by_judge(judge: Judge, cost: float, points: np.ndarray) -> KindCheck:
+    """What the field makes of canonical points (n, 3), by a few known objects of the category.
+
+    cost: at which it explains them.
+    """
+    category, strangeness = judge.model.category or "known object", judge.strangeness(points)
+    if cost < judge.usual_cost + FOREIGN and strangeness < STRANGEST:
+        return KindCheck(category, "like what is known of its kind")
+    warning = (
+        f"the target does not look like a {category} standing upright and facing +X: the field "
+        f"explains it at a cost of {cost:.2f}, {judge.usual_cost:.2f} is usual, and its "
+        f"proportions are {strangeness:.1f} standard deviations off; check that it is one, and "
+        "give --up with the direction that points up if it is in another pose"
+    )
+    return KindCheck(category, _SOMETHING_ELSE, None, (warning,))
