@@ -18,10 +18,10 @@ from nrdf.regions.presence import (
 NEAR = np.full(40, 0.02)
 
 
-def ask(distance=NEAR, exists=0.95, trust=0.8, size=0.9, returned=0.9):
+def ask(distance=NEAR, exists=0.95, trust=0.8, size=0.9, returned=0.9, whole=NEAR):
     exists = np.full(len(distance), exists)
     evidence = evidence_of(exists, trust, size, returned)
-    return find_presence(evidence, distance)
+    return find_presence(evidence, distance, whole)
 
 
 def test_where_all_agrees_the_region_is_there():
@@ -33,6 +33,15 @@ def test_where_nothing_agrees_it_is_absent():
     found = ask(np.full(40, 0.3), exists=0.05, trust=0.05, size=0.01, returned=0.0)
     assert found.reason == ABSENT
     assert found.overlap < SURELY_ABSENT and found.confidence == 1 - found.overlap
+
+
+def test_where_little_is_shown_nothing_is_surely_absent():
+    doubts = {"exists": 0.05, "trust": 0.05, "size": 0.01, "returned": 0.0}
+    partial = np.where(np.arange(40) < 18, 0.02, 0.5)
+    some = ask(partial, **doubts, whole=partial)
+    assert some.reason == "" and some.overlap < SURELY_ABSENT
+    assert ask(partial, **doubts).reason == ABSENT
+    assert ask(np.full(40, 0.3), **doubts, whole=partial).reason == NOT_OBSERVED
 
 
 def test_one_doubt_alone_does_not_empty_a_region():
@@ -74,10 +83,10 @@ def test_evidence_stays_finite():
 
 def test_a_match_has_the_confidence_that_its_presence_allows():
     match = Match(np.arange(4), np.zeros((9, 3)), np.array([0.4, 0.6, 0.6, 0.8]), "mask")
-    doubtful = find_presence(Evidence(0.0, -1.0, -1.0, -1.0), NEAR)
+    doubtful = find_presence(Evidence(0.0, -1.0, -1.0, -1.0), NEAR, NEAR)
     kept = match.with_presence(doubtful)
     assert len(kept.indices) == 4 and kept.score == pytest.approx(doubtful.overlap)
     assert np.allclose(kept.confidence / kept.score, match.confidence / match.score)
-    gone = find_presence(Evidence(-3.9, -3.9, -3.9, -3.9), NEAR)
+    gone = find_presence(Evidence(-3.9, -3.9, -3.9, -3.9), NEAR, NEAR)
     assert gone.reason == ABSENT and len(match.with_presence(gone).indices) == 0
     assert len(match.with_presence(gone, drop_absent=False).indices) == 4

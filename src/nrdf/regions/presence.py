@@ -16,7 +16,8 @@ import numpy as np
 ABSENT, NOT_OBSERVED = "absent", "not observed"
 
 _SEEN = 0.08  # distance within which a mapped point was observed
-_LEAST_SEEN = 0.1  # share of a region's mapped points that makes it observed
+_LEAST_SEEN = 0.05  # share of a region's mapped points that makes it observed
+_SHOWN = 0.5  # share of all mapped points that lie where the scan has points, for absence
 _LEAST_SHARE = 0.02  # that counts as the least
 _SURE = 0.02  # shares of 0 and 1 are as sure as this
 
@@ -77,20 +78,25 @@ def evidence_of(existence: np.ndarray, trust: float, size: float, returned: floa
     )
 
 
-def find_presence(evidence: Evidence, distance: np.ndarray) -> Presence:
+def find_presence(evidence: Evidence, distance: np.ndarray, whole_distance: np.ndarray) -> Presence:
     """Presence of a region on a target.
 
     distance: (m,) of its mapped points from the target's, canonical, in position and weighted
-    normal.
+    normal; whole_distance: (n,) of the whole reference's. Where the scan shows less than half of
+    what it should, no region is surely absent: what lacks may be hidden.
     """
-    observed = float((distance < _SEEN).mean())
+    observed = _observed(distance)
     score = BIAS + float(np.dot(WEIGHTS, evidence))
     overlap = float(1 / (1 + np.exp(-score)))
-    if overlap < SURELY_ABSENT:
+    if overlap < SURELY_ABSENT and _observed(whole_distance) >= _SHOWN:
         return Presence(ABSENT, 1 - overlap, overlap, observed, evidence)
     if observed < _LEAST_SEEN:
         return Presence(NOT_OBSERVED, 1 - observed, overlap, observed, evidence)
     return Presence("", overlap, overlap, observed, evidence)
+
+
+def _observed(distance: np.ndarray) -> float:
+    return float((distance < _SEEN).mean())
 
 
 def _log_odds(share: float) -> float:

@@ -241,7 +241,7 @@ class Taught:
             float(found.mean() / inside.mean()),
             float(back.mean()) if back.size else 0.0,
         )
-        return match.with_presence(find_presence(evidence, off[inside]), drop_absent)
+        return match.with_presence(find_presence(evidence, off[inside], off), drop_absent)
 
     def _returned(self, target: Embedded) -> tuple[np.ndarray, np.ndarray]:
         """Where a target's points lead back to: positions (m,) of some of its working points, and
