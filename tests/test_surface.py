@@ -23,6 +23,21 @@ def test_edges_keep_to_one_side_of_a_thin_board():
     assert (i < j).all() and len(np.unique(surface.edges, axis=0)) == len(i)
 
 
+def test_repeated_points_are_one_and_the_two_sides_of_a_sheet_are_two():
+    points, normals = board()
+    plain = Surface(points, normals)
+    again = Surface(np.concatenate([points, points[:40], points[:7]]),
+                    np.concatenate([normals, normals[:40], normals[:7]]))  # fmt: skip
+    np.testing.assert_array_equal(again.points, plain.points)
+    np.testing.assert_array_equal(again.edges, plain.edges)
+    sheet = Surface(np.concatenate([points, points]), np.concatenate([normals, -normals]))
+    assert len(sheet.points) == 2 * len(points)
+    nearly = points[:9] + 1e-9
+    surface = Surface(np.concatenate([points, nearly]), np.concatenate([normals, normals[:9]]))
+    i, j = surface.edges.T
+    assert np.linalg.norm(surface.points[i] - surface.points[j], axis=1).min() > 1e-6
+
+
 def test_edges_do_not_cross_a_gap():
     surface = Surface(*slats(gap=0.06))
     x, y = surface.points[surface.edges][..., 0], surface.points[surface.edges][..., 1]

@@ -24,6 +24,8 @@ _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SURE = 0.5  # share of one of fewer points that are a plane, as at the end of a thin part
 _SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
+_COINCIDENT = 1e-4  # spacings within which two points are in one place
+_SAME_PLACE = 1e-7  # the same in shares of the longest side, where the spacing is not known yet
 _AT_ONCE = 8192  # places: what is known of each takes many times its own memory
 _ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
@@ -33,9 +35,9 @@ class Surface:
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
     part are told apart by their normals alone. kept: (n,) indices of the points in the cloud as
-    given, which is thinned where it has very many. patches, blocked: what `nrdf.process.patch` and
-    `room` have found out, for their next call. Raises ProcessError if the two do not fit each
-    other, are not finite, or are fewer than 8.
+    given: all but repeated ones, thinned where there are very many. patches, blocked: what
+    `nrdf.process.patch` and `room` have found out, for their next call. Raises ProcessError if
+    the two do not fit each other, are not finite, or are fewer than 8.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray) -> None:
@@ -50,7 +52,8 @@ class Surface:
                 f"a surface needs at least 8 finite points with normals, not {len(points)}"
             )
         self.size = len(points)
-        self.kept = thin(points, MOST_POINTS, np.random.default_rng(0))
+        kept = _distinct(points, normals)
+        self.kept = kept[thin(points[kept], MOST_POINTS, np.random.default_rng(0))]
         self.points = points[self.kept]
         self.normals = unit(normals[self.kept])
         self.patches: dict[bytes, tuple[Patch, ...]] = {}
@@ -101,6 +104,7 @@ class Surface:
         alike = np.einsum("nka,na->nk", self.normals[near], self.normals) > SAME_SIDE
         good = alike & (rise <= 0.6 * distance) & (distance < 3.0 * self.spacing)
         good[:, 0] = False
+        good &= distance > _COINCIDENT * self.spacing  # a pair in one place has no direction
         good &= np.cumsum(good, axis=1) <= _NEIGHBOURS
         i, k = np.nonzero(good)
         pair = np.sort(np.stack([i, near[i, k]], axis=1), axis=1)
@@ -268,6 +272,21 @@ class Surface:
         rise = np.abs((offset @ normals[:, :, None])[..., 0]) / self.spacing
         level = np.clip(3.0 + 1.5 * distance / self.spacing - 2.5 * rise, 0.0, 1.0)
         return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
+
+
+def _distinct(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Indices, ascending, of points (n, 3) without those in the place of another that faces the
+    same side by its normal (n, 3): one stays for each side."""
+    low = points.min(axis=0)
+    side = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
+    place = np.round((points - low) / (_SAME_PLACE * side)).astype(np.int64)
+    _, first, group = np.unique(place, axis=0, return_index=True, return_inverse=True)
+    if len(first) == len(points):
+        return np.arange(len(points))
+    away = np.einsum("na,na->n", normals, normals[first[group.ravel()]]) < 0
+    opposite = np.flatnonzero(away)
+    _, once = np.unique(group.ravel()[opposite], return_index=True)
+    return np.sort(np.concatenate([first, opposite[once]]))
 
 
 def typical_spacing(distance: np.ndarray, number: int) -> float:
