@@ -132,16 +132,16 @@ EXPLAINED = (
     "label, mean over the ordered pairs of which both have the part; a part returned empty counts "
     "as 0. Points of the target's pieces that serve two functions (`mixed`) are left out.",
     "",
-    "Mean IoU: over all those pairs and parts. Plain: the same where the reference has no mixed "
+    "Mean: over all those pairs and parts. Plain: the same where the reference has no mixed "
     "pieces; from one that has, only some of a part is taught (the front legs, where the rear ones "
     "go on as the back's posts).",
     "",
-    "Present told absent: parts that the target has and shows, reported absent or not observed. "
-    f"Present skipped: those, and parts found with less mean confidence than {MIN_CONFIDENCE:g}, "
+    "Told absent: parts that the target has and shows, reported absent or not observed. "
+    f"Skipped: those, and parts found with less mean confidence than {MIN_CONFIDENCE:g}, "
     "which a transfer leaves out. Absent told: parts that the target lacks, left out in one of "
     "these ways; counted only where the target has no mixed pieces.",
     "",
-    "s/pair: median seconds of finding all parts, both objects' normals and embeddings known.",
+    "s: median seconds of finding all parts, both objects' normals and embeddings known.",
 )
 
 

@@ -197,8 +197,7 @@ def select(figures: Sequence[PairFigure], pairs: Pairs) -> list[PairFigure]:
 
 def headings(parts: Sequence[str]) -> list[str]:
     """The columns after the method's."""
-    counts = ["present told absent", "present skipped", "absent told"]
-    return [*parts, "mean IoU", "plain", "s/pair", *counts]
+    return [*parts, "mean", "plain", "s", "told absent", "skipped", "absent told"]
 
 
 def cells(row: Row, parts: Sequence[str]) -> list[str]:

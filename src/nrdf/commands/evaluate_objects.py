@@ -98,6 +98,7 @@ def objects(
         done = evaluate_jobs(settings, found, chosen, count, kept, progress)
     for title, parts, rows in tables(rows_of(figures, sets)):
         shown = table(title, "", *headings(parts))
+        shown.padding = (0, 1, 0, 0)  # so that it fits into 80 columns
         shown.columns[0].no_wrap = True
         for row in rows:
             shown.add_row(row.method, *cells(row, parts))
