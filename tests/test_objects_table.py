@@ -15,7 +15,9 @@ from nrdf.benchmark.objects_pairs import draw_pairs
 from nrdf.benchmark.objects_report import Report
 from nrdf.benchmark.objects_table import (
     Count,
+    cells,
     difference_of,
+    headings,
     is_skipped,
     poses_of,
     rows_of,
@@ -58,6 +60,14 @@ def test_means_are_over_parts_that_both_have_and_counts_of_what_is_skipped():
     assert registration.mean == pytest.approx(2 / 3) and registration.plain == pytest.approx(0.7)
     assert registration.told is registration.absent is None
     assert str(Count(1, 3)) == "33% (1/3)" and str(Count(0, 0)) == ""
+
+
+def test_a_row_is_brief_on_a_terminal():
+    row = rows_of(FIGURES, SETS)[0]
+    full, brief = (cells(row, ["seat", "leg", "arm"], brief) for brief in (False, True))
+    assert full[:4] == ["0.600", "0.000", "", "0.400"] and full[-3] == "33% (1/3)"
+    assert brief[:4] == ["0.60", "0.00", "", "0.400"] and brief[-3] == "33%"
+    assert len(full) == len(brief) == len(headings(["seat", "leg", "arm"]))
 
 
 def test_sets_and_views_have_rows_of_their_own():

@@ -200,11 +200,15 @@ def headings(parts: Sequence[str]) -> list[str]:
     return [*parts, "mean", "plain", "s", "told absent", "skipped", "absent told"]
 
 
-def cells(row: Row, parts: Sequence[str]) -> list[str]:
-    """A row's texts for `headings`, empty where there is no value."""
-    by_part = [f"{row.iou[part][0]:.3f}" if part in row.iou else "" for part in parts]
-    counts = ["" if value is None else str(value) for value in (row.told, row.skipped, row.absent)]
+def cells(row: Row, parts: Sequence[str], brief: bool = False) -> list[str]:
+    """A row's texts for `headings`, empty where there is no value. brief: to fit a terminal, parts
+    with two digits and shares without the counts behind them."""
+    digits = 2 if brief else 3
+    by_part = [f"{row.iou[part][0]:.{digits}f}" if part in row.iou else "" for part in parts]
     means = ["" if np.isnan(value) else f"{value:.3f}" for value in (row.mean, row.plain)]
+    counts = ["" if value is None else str(value) for value in (row.told, row.skipped, row.absent)]
+    if brief:
+        counts = [text.partition(" ")[0] for text in counts]
     return [*by_part, *means, f"{row.seconds:.2f}", *counts]
 
 

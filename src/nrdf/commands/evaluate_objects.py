@@ -101,7 +101,7 @@ def objects(
         shown.padding = (0, 1, 0, 0)  # so that it fits into 80 columns
         shown.columns[0].no_wrap = True
         for row in rows:
-            shown.add_row(row.method, *cells(row, parts))
+            shown.add_row(row.method, *cells(row, parts, brief=True))
         show(shown)
     report = Report(figures, sets, done)
     for line in report.lines():
