@@ -12,6 +12,7 @@ from nrdf.benchmark.objects_jobs import run_job
 from nrdf.benchmark.objects_match import Settings, finder
 from nrdf.errors import OutputError
 from nrdf.field.zoo import find_weights
+from nrdf.process.transfer import Teacher
 
 LOW, HIGH, STOOL = "chair/low", "chair/high", "stool/plain"
 
@@ -63,3 +64,15 @@ def test_what_fails_is_told_with_its_step(settings, monkeypatch):
         job = run_job(settings, LOW, HIGH)
         assert (job.ended, job.complete, job.crashed) == (False, False, crashed)
         assert job.reasons == (said,) and job.paths == 0
+
+
+def test_a_pair_without_a_tool_path_has_not_ended_well(settings, monkeypatch):
+    transfer = Teacher.transfer
+
+    def nothing(self, cloud, unit):
+        return transfer(self, cloud, unit, min_confidence=1.0)
+
+    monkeypatch.setattr(Teacher, "transfer", nothing)
+    job = run_job(settings, LOW, HIGH)
+    assert not job.ended and not job.crashed
+    assert job.reasons[-1].startswith("programs: no tool path: seat: ")

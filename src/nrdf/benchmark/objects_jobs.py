@@ -20,7 +20,7 @@ from trimesh.exchange.ply import export_ply
 
 from nrdf.benchmark.objects_match import Finder, Settings, finder
 from nrdf.cloud import PointCloud, read_cloud
-from nrdf.errors import NrdfError
+from nrdf.errors import NrdfError, ProcessError
 from nrdf.export.registry import export_job
 from nrdf.ply import write_atomically
 from nrdf.process.knowledge_file import validated
@@ -85,6 +85,8 @@ def run_job(settings: Settings, reference: str, target: str) -> JobFigure:
             with timed("job folder"):
                 done.write(folder / _JOB, target)
             with timed("programs"):
+                if all(step.path is None for step in done.paths):
+                    raise ProcessError(f"no tool path: {'; '.join(reasons) or 'nothing found'}")
                 job = read_job(folder / _JOB)
                 export_job(job, FORMATS, folder / _PROGRAMS)
                 paths = len(job.paths)
