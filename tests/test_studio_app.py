@@ -14,6 +14,7 @@ import nrdf
 from nrdf.errors import ModelError
 from nrdf.studio import simulator, uploads
 from nrdf.studio.app import Studio
+from nrdf.studio.computing import Computing
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.panel_targets import ALL
 from nrdf.studio.serving import open_server
@@ -28,7 +29,7 @@ class Page:
     def __init__(self, folder, weights):
         self.weights, self.said = weights, []
         self.server = open_server("127.0.0.1", 8460)
-        self.studio = Studio(Session(folder), self.server, self.load, ["chair"], {})
+        self.studio = Studio(Session(folder), self.server, Computing(self.load), ["chair"], {})
         tell = self.studio.tell
 
         def heard(title, body, bad=True):
@@ -110,7 +111,7 @@ def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
     assert "feed_m_s (*Speed, mm/s*): must be above 0.0, not 0.0" in told
     assert "feed_m_s: must be above 0.0" in page.bring()
     told = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
-    assert "stepover_m (*Between lines, mm*) is 2, wider than the region" in told
+    assert "stepover_m (*Between lines, mm*) is 2 (2000 mm), above what is plausible" in told
 
 
 def test_without_a_model_or_a_result(page):

@@ -13,12 +13,15 @@ import nrdf
 from nrdf.errors import ProcessError, RegionError
 from nrdf.process.lesson import read_lesson
 from nrdf.process.toolpath import read_job
+from nrdf.process.transfer import Teacher
 from nrdf.studio.bench import Bench
+from nrdf.studio.computing import Computing
 from nrdf.studio.desk import Desk
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
 from nrdf.studio.saving import save_job, save_picture, save_programs, zipped
 from nrdf.studio.session import Session
+from nrdf.studio.teaching import lesson_of
 from nrdf.studio.worker import Cancelled
 from taught_box import SIZE, cloud, faces
 
@@ -38,7 +41,7 @@ def bench(tmp_path, untrained):
         desk.paint(REFERENCE, name, mask)
         desk.restart_step(name, 0, kind)
     desk.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
-    return Bench(desk, lambda category: nrdf.load_model(untrained))
+    return Bench(desk, Computing(lambda category: nrdf.load_model(untrained)))
 
 
 def test_plans_hold_as_long_as_what_they_are_of(bench):
@@ -111,9 +114,9 @@ def test_a_region_painted_on_the_target_is_taken_as_it_is(bench):
     assert "look at" in title_of(desk, bench, "new")
 
 
-def test_a_marked_region_must_be_taught_and_on_the_target(bench):
-    bench.transfer(bench.desk.document, silent)
-    teacher, target = bench.results["new"].teacher, bench.results["new"].embedded
+def test_a_marked_region_must_be_taught_and_on_the_target(bench, untrained):
+    lesson = lesson_of(bench.desk.session.clouds, bench.desk.document)
+    teacher, target = Teacher(lesson, nrdf.load_model(untrained)), cloud(seed=1)
     with pytest.raises(RegionError, match="no taught region 'lid'; known: top, front"):
         teacher.transfer(target, marked={"lid": [1, 2]})
     with pytest.raises(RegionError, match=r"region 'top' on the target: .*are not on"):
@@ -137,7 +140,7 @@ def test_likeness_is_greatest_around_the_point_itself(bench):
     bench.transfer(document, silent)
     found = bench.described(document, silent)
     assert found.unlike(17)["new"].shape == (len(bench.desk.body("new").points),)
-    assert found.objects[REFERENCE][1] is described.objects[REFERENCE][1], "computed once"
+    assert found.objects[REFERENCE] is described.objects[REFERENCE], "computed once"
 
 
 def test_what_is_drawn(bench):

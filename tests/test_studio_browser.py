@@ -25,6 +25,7 @@ from nrdf.bundled import bundled_chair
 from nrdf.process.lesson import read_lesson
 from nrdf.process.toolpath import read_job
 from nrdf.studio.app import Studio
+from nrdf.studio.computing import SeparateComputing
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.mouse import view_of
 from nrdf.studio.serving import open_server
@@ -177,7 +178,8 @@ class Person:
 @pytest.fixture
 def studio(tmp_path):
     server = open_server("127.0.0.1", 8480)
-    made = Studio(Session(tmp_path / "session"), server, nrdf.load_model, ["chair"], {})
+    computing = SeparateComputing(nrdf.load_model)
+    made = Studio(Session(tmp_path / "session"), server, computing, ["chair"], {})
     yield made
     made.stop()
     server.stop()

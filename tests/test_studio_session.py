@@ -197,9 +197,9 @@ def test_overlaps_are_told(painted):
     painted.paint(REFERENCE, "front", painted.document.region("top").mask)
     assert "top" in painted.shared()[0] and "front" in painted.shared()[0]
     with pytest.raises(ProcessError, match="overlap"):
-        lesson_of(painted.session, painted.document)
+        lesson_of(painted.session.clouds, painted.document)
     painted.allow_overlap(True)
-    assert len(lesson_of(painted.session, painted.document).regions) == 2
+    assert len(lesson_of(painted.session.clouds, painted.document).regions) == 2
 
 
 def test_steps(painted):
@@ -245,11 +245,11 @@ def test_wrong_numbers_are_named_by_field_and_value(painted, shown, message):
 def test_knowledge_needs_a_reference_and_a_region(tmp_path):
     desk = Desk(Session(tmp_path / "session"))
     with pytest.raises(ProcessError, match="step 1"):
-        lesson_of(desk.session, desk.document)
+        lesson_of(desk.session.clouds, desk.document)
     desk.open_reference("box.ply", cloud(), "chair")
     desk.add_region()
     with pytest.raises(ProcessError, match="step 2"):
-        lesson_of(desk.session, desk.document)
+        lesson_of(desk.session.clouds, desk.document)
 
 
 def test_knowledge_goes_out_and_comes_back(painted, tmp_path):

@@ -131,7 +131,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
     assert json.loads((tmp_path / "sim" / "report.json").read_text())["title"] == "plate"
     assert {"joints.csv", "report.html"} <= set(report["files"])
     assert [path.name for path in tmp_path.iterdir()] == ["sim"]
-    running._process.kill()
+    running._separate._process.kill()
     with pytest.raises(RobotError, match="ended by itself"):
         running.write(tmp_path / "sim", "plate", {}, silent)
     running.end()
@@ -162,7 +162,7 @@ def test_cancelling_ends_the_process(job):  # noqa: F811
     assert waits.wait(10)
     running.end()
     waiting.join(10)
-    assert not running._process.is_alive() and told == ["cancelled"]
+    assert not running._separate._process.is_alive() and told == ["cancelled"]
 
 
 def test_without_mujoco_it_says_what_to_install(monkeypatch):

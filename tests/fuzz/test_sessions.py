@@ -63,7 +63,7 @@ def opened(valid, folder, text):
             assert np.isfinite(list(shown_numbers(step).values())).all()
             float(step["tool"].get("radius_m", 0.0))
             outcome_of(lambda r=region, n=number: process_of(r, n))
-    outcome_of(lambda: lesson_of(session, desk.document))
+    outcome_of(lambda: lesson_of(session.clouds, desk.document))
     session.save()
     assert not Session(folder).damage, "what was opened can be opened again"
 

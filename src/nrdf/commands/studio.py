@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -48,6 +49,7 @@ def studio(
     import nrdf
     from nrdf.field.zoo import list_models
     from nrdf.studio.app import Studio
+    from nrdf.studio.computing import SeparateComputing
     from nrdf.studio.serving import LOOPBACK, open_server
     from nrdf.studio.session import Session
 
@@ -60,8 +62,8 @@ def studio(
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
-        kept, server, lambda name: nrdf.load_model(name, device), categories, origin, robot,
-        tool_frame,
+        kept, server, SeparateComputing(partial(nrdf.load_model, device=device)), categories,
+        origin, robot, tool_frame,
     )  # fmt: skip
     if host not in LOOPBACK:
         errors.print(

@@ -174,8 +174,8 @@ class Taught:
         return self._invert(target, self._describe(points, normals), normals)
 
     def described(self, target: Embedded) -> np.ndarray:
-        """What the descriptors of a target's, or the reference's, working points (n, 6) say, to be
-        compared by `unlike`.
+        """What the descriptors of a target's, or the reference's, working points (n, 6) say: what
+        is alike is near.
 
         Descriptors of two shapes are compared by the places on the reference that C finds for
         them, C(z_reference, θ(z_target, x)), with their weighted normals. Raises ModelError for a
@@ -184,15 +184,6 @@ class Taught:
         k = self._describe(target.points, target.normals, target.z)
         landed = self._invert(self.reference, k, target.normals)
         return oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
-
-    def unlike(self, index: int, described: np.ndarray) -> np.ndarray:
-        """How far (n,), in canonical position and weighted normal, what is `described` (n, 6) is
-        from a point of the reference's cloud."""
-        own = int(self.reference.nearest_working[index])
-        here = oriented_features(
-            self.reference.points[[own]], self.reference.normals[[own]], NORMAL_WEIGHT
-        )
-        return np.asarray(np.linalg.norm(described - here, axis=1))
 
     def facing(self, regions: Mapping[str, np.ndarray], target: Embedded) -> Embedded:
         """The target with its sheets turned to the side that the regions are on.

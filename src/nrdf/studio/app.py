@@ -12,8 +12,9 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.bench import Bench, Described
+from nrdf.studio.bench import Bench
 from nrdf.studio.colours import COLOURINGS, likeness_colours
+from nrdf.studio.computing import Computing, Described, SeparateComputing
 from nrdf.studio.desk import Desk
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
@@ -23,13 +24,14 @@ from nrdf.studio.session import Session
 from nrdf.studio.stage import Figure, Stage
 from nrdf.studio.teaching import ORIGIN
 from nrdf.studio.trial import Trial
+from nrdf.studio.uploads import check_upload, shown_name
 from nrdf.studio.worker import Progress, Worker
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from nrdf.regions.model import Model
+    from nrdf.cloud import PointCloud
 
 log = logging.getLogger(__name__)
 
@@ -41,16 +43,16 @@ _PATCH = 0.08  # first radius of a patch, in sides of the object
 class Studio:
     """Everything between browsers and a session; all that are connected see the same.
 
-    server: a viser server with nothing on it yet. load: gives the model of a category, one of
-    `categories`. origin: what reports say of how they were made. robot, tool_frame: the arm of
-    simulations, the bundled one unless given.
+    server: a viser server with nothing on it yet. computing: what plans and transfers, for objects
+    of one of `categories`. origin: what reports say of how they were made. robot, tool_frame: the
+    arm of simulations, the bundled one unless given.
     """
 
     def __init__(
         self,
         session: Session,
         server: viser.ViserServer,
-        load: Callable[[str], Model],
+        computing: Computing | SeparateComputing,
         categories: Sequence[str],
         origin: Mapping[str, Any],
         robot: Path | None = None,
@@ -58,7 +60,7 @@ class Studio:
     ) -> None:
         self.server, self.categories, self.origin = server, tuple(categories), origin
         self.desk = Desk(session)
-        self.bench = Bench(self.desk, load)
+        self.bench = Bench(self.desk, computing)
         self.stage = Stage(server)
         self.lock = threading.RLock()
         self.region, self.step, self.radius_m = "", 0, 0.05
@@ -67,7 +69,7 @@ class Studio:
         """The one target that is shown beside the reference, None for all."""
         self._likeness: dict[str, np.ndarray] = {}
         self._described: Described | None = None
-        self._pointed = 0
+        self._pointed = self._uploads = 0
         self.mouse = Mouse(self)
         self.panel = Panel(self)
         working = self.panel.working
@@ -218,6 +220,24 @@ class Studio:
         self._later("transfer", "finding regions and planning tool paths", delay_s,
                     lambda progress: self.bench.transfer(document, progress))  # fmt: skip
 
+    def read(
+        self, file: Any, category: str, unit: str | None, then: Callable[[PointCloud], None]
+    ) -> None:
+        """Read a file that a browser sent, in the background, and give its cloud to `then`.
+
+        Raises CloudError for a file of another type, or too large a one.
+        """
+        name, content = file.name, file.content
+        check_upload(name, len(content))
+
+        def work(progress: Progress) -> None:
+            cloud = self.bench.read(name, content, category, unit, progress)
+            with self.lock:
+                then(cloud)
+
+        self._uploads += 1  # each is a job of its own
+        self._later(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
+
     def compare(self, key: str, index: int) -> None:
         """Colour every object by how alike its points are to a shown point of the reference: in
         the background the first time, at once while the mouse goes on from there."""
@@ -273,6 +293,7 @@ class Studio:
     def stop(self) -> None:
         """End all that runs beside the page."""
         self.worker.stop()
+        self.bench.stop()
         self.trial.stop()
 
     # --- talking

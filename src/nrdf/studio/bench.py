@@ -3,55 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from nrdf.cloud import PointCloud
 from nrdf.errors import NrdfError, ProcessError
-from nrdf.process.knowledge_check import Checked, check_process
 from nrdf.process.limits import DOUBTFUL
-from nrdf.process.transfer import Teacher, Transferred, touched
-from nrdf.regions.embedded import Embedded
+from nrdf.process.transfer import Transferred
+from nrdf.studio.computing import (
+    Computing,
+    Described,
+    Plan,
+    SeparateComputing,
+    without_clouds,
+)
 from nrdf.studio.desk import Desk
-from nrdf.studio.document import REFERENCE, Document, Painted, Target
-from nrdf.studio.teaching import lesson_of, process_of
+from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
 from nrdf.studio.worker import Progress
-
-if TYPE_CHECKING:
-    from nrdf.regions.model import Model
-    from nrdf.regions.taught import Taught
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A step on the reference. fault: why there is no plan; checked: None where the step itself is
-    wrong."""
-
-    fault: str
-    checked: Checked | None = None
-
-    @property
-    def lines(self) -> list[np.ndarray]:
-        """Places (m, 3) on the surface that each line works."""
-        if self.checked is None:
-            return []
-        height = self.checked.process.standoff_m
-        return [
-            touched(s.positions, s.quaternions_xyzw, height)
-            for s in self.checked.segments
-            if s.kind == "process"
-        ]
 
 
 @dataclass(frozen=True)
 class Result:
-    """What arrived on a target, and of which document."""
+    """What arrived on a target, and of which lesson, by its number."""
 
     transferred: Transferred
-    embedded: Embedded
-    teacher: Teacher
+    lesson: int
     target: Target
 
     @property
@@ -61,37 +38,29 @@ class Result:
         return [r.name for r in regions if r.missing or r.match.score < DOUBTFUL]
 
 
-@dataclass(frozen=True)
-class Described:
-    """What the descriptors of several objects say, by `nrdf.regions.taught.Taught.described`."""
-
-    objects: Mapping[str, tuple[Taught, np.ndarray]]
-
-    def unlike(self, index: int) -> dict[str, np.ndarray]:
-        """How far each object's shown points (k,) are from a shown point of the reference."""
-        return {key: taught.unlike(index, said) for key, (taught, said) in self.objects.items()}
-
-
 class Bench:
-    """Plans and transfers of a desk's document, each kept as long as it holds.
+    """Plans and transfers of a desk's document, each kept as long as it holds."""
 
-    load: gives the model of a category.
-    """
-
-    def __init__(self, desk: Desk, load: Callable[[str], Model]) -> None:
+    def __init__(self, desk: Desk, computing: Computing | SeparateComputing) -> None:
         self.desk = desk
         self.results: dict[str, Result] = {}
-        self._load = load
-        self._models: dict[str, Model] = {}
+        self._computing = computing
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
-        self._teacher: tuple[Document, Teacher] | None = None
-        self._described: dict[str, tuple[Taught, Embedded, np.ndarray]] = {}
+        self._lesson: tuple[Document, int] | None = None
+        self._lessons = 0
 
-    def model(self, category: str) -> Model:
-        """The category's model, loaded once."""
-        if category not in self._models:
-            self._models[category] = self._load(category)
-        return self._models[category]
+    def stop(self) -> None:
+        """End what computes."""
+        self._computing.end()
+
+    def read(
+        self, name: str, content: bytes, category: str, unit: str | None, progress: Progress
+    ) -> PointCloud:
+        """The cloud, in metres, of a file that a browser sent, as of `read_upload`."""
+        cloud: PointCloud = self._computing.ask(
+            "read", name, content, category, unit, progress=progress
+        )
+        return cloud
 
     # --- plans on the reference
 
@@ -118,17 +87,13 @@ class Bench:
             if self.desk.document.reference is not document.reference:
                 return
             basis = _basis(document, region, number)
-            self._plans[region.name, number] = basis, self._made(region, number)
-
-    def _made(self, region: Painted, number: int) -> Plan:
-        body = self.desk.body(REFERENCE)
-        try:
-            process = process_of(region, number)
-        except ProcessError as error:
-            return Plan(str(error))
-        indices = np.flatnonzero(region.mask)
-        checked = check_process(body.surface, region.name, indices, process, body.given)
-        return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
+            self._computing.share(_objects(document))
+            assert document.reference is not None  # regions are on one
+            made = self._computing.ask(
+                "plan", document.reference.file, region, number,
+                progress=_within(progress, done, len(waiting)),
+            )  # fmt: skip
+            self._plans[region.name, number] = basis, made
 
     # --- targets
 
@@ -138,9 +103,9 @@ class Bench:
         return (
             result is not None
             and result.target is self.desk.target(key)
-            and self._teacher is not None
-            and result.teacher is self._teacher[1]
-            and _same_lesson(self._teacher[0], self.desk.document)
+            and self._lesson is not None
+            and result.lesson == self._lesson[1]
+            and _same_lesson(self._lesson[0], self.desk.document)
         )
 
     def ready(self, key: str) -> Result:
@@ -161,52 +126,58 @@ class Bench:
         Raises NrdfError for a document that is not complete, naming region, field and value, and
         what `Teacher.transfer` raises, naming the target.
         """
-        teacher = self._taught(document)
-        targets = [t for t in document.targets if not self._has(t, teacher)]
+        lesson = self._taught(document, progress)
+        targets = [t for t in document.targets if not self._has(t, lesson)]
         for done, target in enumerate(targets):
-            self._transfer(target, teacher, _within(progress, done, len(targets)))
+            self._transfer(target, lesson, _within(progress, done, len(targets)))
 
-    def _has(self, target: Target, teacher: Teacher) -> bool:
+    def _has(self, target: Target, lesson: int) -> bool:
         result = self.results.get(target.object.name)
-        return result is not None and result.teacher is teacher and result.target is target
+        return result is not None and result.lesson == lesson and result.target is target
 
-    def _taught(self, document: Document) -> Teacher:
-        if self._teacher is None or not _same_lesson(self._teacher[0], document):
-            lesson = lesson_of(self.desk.session, document)
-            self._teacher = document, Teacher(lesson, self.model(document.category))
-        return self._teacher[1]
+    def _taught(self, document: Document, progress: Progress) -> int:
+        """The number of what a document teaches, which is ready to be transferred then."""
+        if self._lesson is not None and _same_lesson(self._lesson[0], document):
+            number = self._lesson[1]
+        else:  # one that was never given: what was cancelled may have been taught all the same
+            self._lessons += 1
+            number = self._lessons
+        self._computing.share(_objects(document))
+        clouds = self.desk.session.clouds
+        self._computing.ask("teach", number, clouds, without_clouds(document), progress=progress)
+        self._lesson = document, number
+        return number
 
-    def _transfer(self, target: Target, teacher: Teacher, progress: Progress) -> None:
-        progress(0, 1)
-        name, earlier = target.object.name, self.results.get(target.object.name)
+    def _transfer(self, target: Target, lesson: int, progress: Progress) -> None:
+        name = target.object.name
         try:
-            if earlier is not None and earlier.embedded.cloud is target.object.cloud:
-                embedded = earlier.embedded
-            else:
-                embedded = teacher.model.embed(target.object.cloud)
-            marked = dict(target.corrected)
-            transferred = teacher.transfer(embedded, marked=marked, progress=progress)
+            transferred = self._computing.ask(
+                "transfer", target.object.file, dict(target.corrected), progress=progress
+            )
         except NrdfError as error:
             raise type(error)(f"target {name}: {error}") from None
-        self.results[name] = Result(transferred, embedded, teacher, target)
+        self.results[name] = Result(transferred, lesson, target)
 
     # --- likeness
 
     def described(self, document: Document, progress: Progress) -> Described:
         """What the descriptors of the reference and of every target with a result say, computed
         where it has changed."""
-        teacher = self._taught(document)
-        of: dict[str, tuple[Taught, Embedded]] = {
-            REFERENCE: (teacher.taught, teacher.taught.reference)
-        }
-        of |= {key: (r.teacher.taught, r.embedded) for key, r in self.results.items()}
-        kept = self._described
-        for done, (key, (taught, embedded)) in enumerate(of.items()):
-            progress(done, len(of))
-            earlier = kept.get(key)
-            if earlier is None or earlier[0] is not taught or earlier[1] is not embedded:
-                kept[key] = (taught, embedded, taught.described(embedded))
-        return Described({key: (kept[key][0], kept[key][2]) for key in of})
+        self._taught(document, progress)
+        assert document.reference is not None  # else nothing is taught
+        files = {REFERENCE: document.reference.file}
+        files |= {key: r.target.object.file for key, r in self.results.items()}
+        results = [result.target.object for result in self.results.values()]
+        self._computing.share([*_objects(document), *results])
+        described: Described = self._computing.ask(
+            "describe", document.reference.file, files, progress=progress
+        )
+        return described
+
+
+def _objects(document: Document) -> list[Loaded]:
+    first = [] if document.reference is None else [document.reference]
+    return [*first, *(target.object for target in document.targets)]
 
 
 def _basis(document: Document, region: Painted, number: int) -> bytes:

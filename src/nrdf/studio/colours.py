@@ -56,7 +56,7 @@ def confidence_colours(count: int, regions: Sequence[tuple[np.ndarray, np.ndarra
 def likeness_colours(unlikeness: np.ndarray, width: float) -> np.ndarray:
     """Colours (n, 3) uint8 by how alike descriptors are: yellow where the same, blue where not.
 
-    unlikeness: (n,) as `nrdf.regions.taught.Taught.unlike` gives it; width: at which likeness
+    unlikeness: (n,) as `nrdf.studio.computing.Described.unlike` gives it; width: at which likeness
     has fallen to 1/e.
     """
     alike = np.exp(-((unlikeness / max(width, 1e-6)) ** 2))[:, None]

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from nrdf.bundled import KNOWLEDGE, REFERENCE
 from nrdf.process.lesson import read_lesson
-from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled, read_upload
+from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.units import METRES
 
 if TYPE_CHECKING:
+    from nrdf.cloud import PointCloud
     from nrdf.studio.panel import Panel, Said
 
 AS_IN_FILE = "as the file says"
@@ -61,9 +62,13 @@ class ObjectTab:
         self.studio.restore()
 
     def _load(self, file: Any) -> None:
-        cloud = read_upload(file.name, file.content, self.category.value, unit_of(self.unit.value))
-        self.studio.desk.open_reference(file.name, cloud, self.category.value)
-        self.studio.restore()
+        category = self.category.value
+
+        def opened(cloud: PointCloud) -> None:
+            self.studio.desk.open_reference(file.name, cloud, category)
+            self.studio.restore()
+
+        self.studio.read(file, category, unit_of(self.unit.value), opened)
 
     def _ask(self, said: Said) -> None:
         gui = self.studio.server.gui

@@ -9,7 +9,7 @@ from nrdf.process.limits import DOUBTFUL, Limits
 from nrdf.process.report import report_of, shares_in_words
 from nrdf.studio.colours import COLOURINGS
 from nrdf.studio.panel_object import AS_IN_FILE, unit_of
-from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled, read_upload
+from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.units import METRES
 
 if TYPE_CHECKING:
@@ -87,13 +87,16 @@ class TargetsTab:
             self._added(name, bundled(name))
 
     def _load(self, file: Any) -> None:
-        category = self.studio.desk.document.category
-        unit = unit_of(self.unit.value)
-        self._added(file.name, read_upload(file.name, file.content, category, unit))
+        self._need_reference()
+        category, unit = self.studio.desk.document.category, unit_of(self.unit.value)
+        self.studio.read(file, category, unit, lambda cloud: self._added(file.name, cloud))
 
-    def _added(self, name: str, cloud: Any) -> None:
+    def _need_reference(self) -> None:
         if self.studio.desk.document.reference is None:
             raise NrdfError("there is no reference yet: open one in step 1 first")
+
+    def _added(self, name: str, cloud: Any) -> None:
+        self._need_reference()
         self.studio.desk.add_target(name, cloud)
         self.studio.beside = None
         self.studio.sync()

@@ -34,7 +34,7 @@ def save_knowledge(desk: Desk) -> Path:
 
     Raises ProcessError for knowledge that is not complete.
     """
-    knowledge, document = knowledge_of(desk.session, desk.document), desk.document
+    knowledge, document = knowledge_of(desk.session.clouds, desk.document), desk.document
     assert document.reference is not None  # else there is no knowledge
     place = place_of(desk, "knowledge")
     with output_folder(place, overwrite=True) as folder:

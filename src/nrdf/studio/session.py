@@ -87,6 +87,11 @@ class Session:
         """Write the document, all of it or nothing."""
         write_document(self.folder, self.document)
 
+    @property
+    def clouds(self) -> Path:
+        """The folder of the objects' clouds."""
+        return self.folder / CLOUDS
+
     def path_of(self, loaded: Loaded) -> Path:
         """The file of an object's cloud."""
         return self.folder / CLOUDS / loaded.file

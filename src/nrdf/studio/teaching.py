@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -13,8 +14,6 @@ from nrdf.process.knowledge_file import validated
 from nrdf.process.knowledge_new import DEFAULTS
 from nrdf.process.lesson import Lesson, bind, checksum, overlaps
 from nrdf.studio.document import Document, Painted
-from nrdf.studio.session import Session
-from nrdf.studio.session_file import CLOUDS
 from nrdf.units import OTHER_UNITS, to_si
 
 PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")
@@ -72,7 +71,7 @@ def process_of(region: Painted, number: int) -> Process:
     return validated(content, ORIGIN).regions[0].processes[number]
 
 
-def knowledge_of(session: Session, document: Document) -> Knowledge:
+def knowledge_of(clouds: Path, document: Document) -> Knowledge:
     """The document as process knowledge, whose file belongs into the folder of the clouds.
 
     Raises ProcessError for a document without reference or regions, and as `validated` does.
@@ -82,7 +81,7 @@ def knowledge_of(session: Session, document: Document) -> Knowledge:
     drawn = tuple(region for region in document.regions if region.mask.any())
     if not drawn:
         raise ProcessError("no region is painted yet: paint one in step 2")
-    path = session.path_of(document.reference)
+    path = clouds / document.reference.file
     reference = {"cloud": document.reference.file, "sha256": checksum(path)}
     return validated(
         {"allow_overlap": document.allow_overlap, **_content(document.category, reference, drawn)},
@@ -90,7 +89,7 @@ def knowledge_of(session: Session, document: Document) -> Knowledge:
     )
 
 
-def lesson_of(session: Session, document: Document) -> Lesson:
+def lesson_of(clouds: Path, document: Document) -> Lesson:
     """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
     as `knowledge_of` and `nrdf.process.lesson.bind` do."""
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
@@ -99,7 +98,7 @@ def lesson_of(session: Session, document: Document) -> Lesson:
             f"{line.partition(';')[0]}; erase those points, which are dark, from one of them in "
             "step 2, or tick 'Regions may overlap' there"
         )
-    return bind(knowledge_of(session, document), session.folder / CLOUDS, ORIGIN)
+    return bind(knowledge_of(clouds, document), clouds, ORIGIN)
 
 
 def _content(

@@ -30,14 +30,8 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
     the file does not say it. Raises CloudError for a file that is too large, of another type, or
     that `nrdf.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
     """
+    ending = check_upload(name, len(content))
     shown = shown_name(name)
-    ending = PurePath(shown).suffix.lower()
-    if ending not in ENDINGS:
-        raise CloudError(
-            f"{shown} is no point cloud or mesh: the name must end with one of {', '.join(ENDINGS)}"
-        )
-    if len(content) > LARGEST_UPLOAD:
-        raise CloudError(too_large(shown, len(content)))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"upload{ending}"
         path.write_bytes(content)
@@ -47,6 +41,19 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
         except NrdfError as error:
             raise type(error)(str(error).replace(str(path), shown)) from None
     return in_metres(cloud, known_unit(cloud, unit, category, shown, "the unit"))
+
+
+def check_upload(name: str, size: int) -> str:
+    """The ending of a file's name. Raises CloudError for another type, or too many bytes."""
+    shown = shown_name(name)
+    ending = PurePath(shown).suffix.lower()
+    if ending not in ENDINGS:
+        raise CloudError(
+            f"{shown} is no point cloud or mesh: the name must end with one of {', '.join(ENDINGS)}"
+        )
+    if size > LARGEST_UPLOAD:
+        raise CloudError(too_large(shown, size))
+    return ending
 
 
 def too_large(shown: str, size: int) -> str:

@@ -1,0 +1,254 @@
+"""What takes long, or reads what strangers have made: plans, transfers, descriptors and uploads.
+
+It can be done in a process of its own, so that whatever ends that process (a fault of native code,
+a lack of memory) leaves the studio, and all that a person has made, alive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nrdf.cloud import PointCloud
+from nrdf.errors import NrdfError, ProcessError
+from nrdf.process.knowledge_check import Checked, check_process
+from nrdf.process.transfer import Teacher, Transferred, touched
+from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.studio.body import Body
+from nrdf.studio.document import Document, Loaded, Painted
+from nrdf.studio.separate import Separate, answer, progress_of
+from nrdf.studio.teaching import lesson_of, process_of
+from nrdf.studio.uploads import read_upload
+from nrdf.studio.worker import Progress
+
+if TYPE_CHECKING:
+    from nrdf.regions.embedded import Embedded
+    from nrdf.regions.model import Model
+
+_NOT_SENT = PointCloud(np.zeros((0, 3)))
+
+
+class ComputingEnded(NrdfError):
+    """The process that computes has ended by itself."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A step on the reference. fault: why there is no plan; checked: None where the step itself is
+    wrong."""
+
+    fault: str
+    checked: Checked | None = None
+
+    @property
+    def lines(self) -> list[np.ndarray]:
+        """Places (m, 3) on the surface that each line works."""
+        if self.checked is None:
+            return []
+        height = self.checked.process.standoff_m
+        return [
+            touched(s.positions, s.quaternions_xyzw, height)
+            for s in self.checked.segments
+            if s.kind == "process"
+        ]
+
+
+@dataclass(frozen=True)
+class Described:
+    """What the descriptors of several objects say, by `nrdf.regions.taught.Taught.described`.
+
+    objects: (n, 6) of the points that are shown, by object. reference: (k, 6) of the reference's
+    own points; nearest: (m,) which of them stands for each of its cloud's points.
+    """
+
+    objects: Mapping[str, np.ndarray]
+    reference: np.ndarray
+    nearest: np.ndarray
+
+    def unlike(self, index: int) -> dict[str, np.ndarray]:
+        """How far each object's shown points (k,) are from a shown point of the reference."""
+        here = self.reference[self.nearest[index]]
+        return {key: np.linalg.norm(said - here, axis=1) for key, said in self.objects.items()}
+
+
+class Computing:
+    """Computes for one document after the other, and keeps what the next can use.
+
+    load: gives the model of a category. Every order is a method, by name and arguments; `share`
+    comes before those that are about objects.
+    """
+
+    def __init__(self, load: Callable[[str], Model]) -> None:
+        self._load = load
+        self._models: dict[str, Model] = {}
+        self._clouds: dict[str, PointCloud] = {}
+        self._bodies: dict[str, Body] = {}
+        self._embedded: dict[tuple[str, str], Embedded] = {}
+        self._said: dict[tuple[str, str, str], np.ndarray] = {}
+        self._teacher: tuple[int, Teacher] | None = None
+
+    def ask(self, name: str, *args: Any, progress: Progress) -> Any:
+        """One of the methods below, by its name."""
+        return getattr(self, name)(*args, progress=progress)
+
+    def share(self, objects: Iterable[Loaded]) -> None:
+        """Know the clouds of these objects, by their files, and forget all others."""
+        self.know({loaded.file: loaded.cloud for loaded in objects})
+
+    def know(self, clouds: Mapping[str, PointCloud | None]) -> None:
+        """Know these clouds, by their files; None stands for one that is known already."""
+        self._clouds = {f: self._clouds[f] if c is None else c for f, c in clouds.items()}
+        self._bodies = {f: body for f, body in self._bodies.items() if f in clouds}
+        self._embedded = {k: kept for k, kept in self._embedded.items() if k[1] in clouds}
+        self._said = {k: said for k, said in self._said.items() if {k[1], k[2]} <= set(clouds)}
+
+    def end(self) -> None:
+        """Nothing is to be ended."""
+
+    def read(
+        self, name: str, content: bytes, category: str, unit: str | None, progress: Progress
+    ) -> PointCloud:
+        """`nrdf.studio.uploads.read_upload`."""
+        progress(0, 1)
+        return read_upload(name, content, category, unit)
+
+    def plan(self, reference: str, region: Painted, number: int, progress: Progress) -> Plan:
+        """A step of a region, planned on the reference."""
+        progress(0, 1)
+        try:
+            process = process_of(region, number)
+        except ProcessError as error:
+            return Plan(str(error))
+        body = self._body(reference)
+        indices = np.flatnonzero(region.mask)
+        checked = check_process(body.surface, region.name, indices, process, body.given)
+        return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
+
+    def teach(self, lesson: int, clouds: Path, document: Document, progress: Progress) -> None:
+        """Get ready to bring a document's processes to targets. lesson: its number, which differs
+        for what teaches something else; clouds: the folder of their files.
+
+        Raises NrdfError for a document that is not complete, naming region, field and value.
+        """
+        progress(0, 1)
+        if self._teacher is None or self._teacher[0] != lesson:
+            model = self._model(document.category)
+            self._teacher = lesson, Teacher(lesson_of(clouds, document), model)
+
+    def transfer(
+        self, target: str, marked: Mapping[str, np.ndarray], progress: Progress
+    ) -> Transferred:
+        """Bring what was taught last to the object of a file; marked: regions painted on it."""
+        progress(0, 1)
+        teacher = self._taught
+        return teacher.transfer(self._seen(target), marked=dict(marked), progress=progress)
+
+    def describe(self, reference: str, files: Mapping[str, str], progress: Progress) -> Described:
+        """What the descriptors of objects, by key and file, say of what was taught last."""
+        taught = self._taught.taught
+        said = {}
+        for done, (key, file) in enumerate(files.items()):
+            progress(done, len(files))
+            place = (self._taught.model.category, reference, file)
+            if place not in self._said:
+                seen = taught.reference if file == reference else self._seen(file)
+                self._said[place] = taught.described(seen)
+            said[key] = self._said[place]
+        own = oriented_features(taught.reference.points, taught.reference.normals, NORMAL_WEIGHT)
+        return Described(said, own, taught.reference.nearest_working)
+
+    @property
+    def _taught(self) -> Teacher:
+        assert self._teacher is not None, "`teach` comes first"
+        return self._teacher[1]
+
+    def _model(self, category: str) -> Model:
+        if category not in self._models:
+            self._models[category] = self._load(category)
+        return self._models[category]
+
+    def _body(self, file: str) -> Body:
+        if file not in self._bodies:
+            self._bodies[file] = Body(self._clouds[file])
+        return self._bodies[file]
+
+    def _seen(self, file: str) -> Embedded:
+        model = self._taught.model
+        if (model.category, file) not in self._embedded:
+            self._embedded[model.category, file] = model.embed(self._clouds[file])
+        return self._embedded[model.category, file]
+
+
+class SeparateComputing:
+    """The same, in a process of its own, which is started when it is needed, and again when it has
+    ended; clouds go there once.
+
+    load: can be sent to a process: a function of a module, or `functools.partial` of one.
+    """
+
+    def __init__(self, load: Callable[[str], Model]) -> None:
+        self._load = load
+        self._separate: Separate | None = None
+        self._wanted: dict[str, PointCloud] = {}
+        self._known: set[str] = set()
+
+    def share(self, objects: Iterable[Loaded]) -> None:
+        """As of `Computing`."""
+        self._wanted = {loaded.file: loaded.cloud for loaded in objects}
+
+    def ask(self, name: str, *args: Any, progress: Progress) -> Any:
+        """As of `Computing`. Raises ComputingEnded where the process ends before it answers."""
+        if self._separate is None or not self._separate.alive:
+            self.end()
+            self._separate = Separate(_serve, (self._load,), _gone)
+        sent = {f: None if f in self._known else c for f, c in self._wanted.items()}
+        self._known = set(sent)
+        try:
+            return self._separate.ask((sent, name, args), progress)
+        except ComputingEnded:
+            self.end()
+            raise
+
+    def end(self) -> None:
+        """End the process."""
+        self._known = set()
+        if self._separate is not None:
+            self._separate.end()
+        self._separate = None
+
+
+def without_clouds(document: Document) -> Document:
+    """The document as it is sent: objects are known by their files."""
+
+    def bare(loaded: Loaded) -> Loaded:
+        return replace(loaded, cloud=_NOT_SENT)
+
+    reference = None if document.reference is None else bare(document.reference)
+    targets = tuple(replace(t, object=bare(t.object)) for t in document.targets)
+    return replace(document, reference=reference, targets=targets)
+
+
+def _gone(why: str) -> ComputingEnded:
+    return ComputingEnded(
+        f"the process that computes has ended by itself ({why}), by a fault of native code or for "
+        "lack of memory. What you made is kept. It is started again with the next thing that you "
+        "do; if it ends again, take away the object or region that it worked on"
+    )
+
+
+def _serve(pipe: Connection, load: Callable[[str], Model]) -> None:
+    """In the process: what is asked for, until the other side is gone."""
+    computing = Computing(load)
+    while True:
+        order = pipe.recv()
+        if order is not None:  # else given up when it was answered already
+            clouds, name, args = order
+            computing.know(clouds)
+            ask = partial(computing.ask, name, *args, progress=progress_of(pipe))
+            answer(pipe, ask)
