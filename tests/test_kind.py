@@ -259,5 +259,6 @@ def test_without_a_network_a_target_is_compared_with_the_reference(monkeypatch):
     taught = nrdf.load_model("chair").set_reference(PointCloud(member("chair")))
     same = taught.check_kind(taught.model.embed(PointCloud(member("chair", 1_000_010))))
     car = taught.check_kind(taught.model.embed(PointCloud(member("car"))))
-    assert same.fits and same.probability is None
+    lying = taught.check_kind(taught.model.embed(PointCloud(member("chair")[:, [0, 2, 1]])))
+    assert same.fits and same.probability is None and not lying.fits
     assert "the field explains it at a cost of" in car.warnings[0]

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.benchmark import scans
 from nrdf.benchmark.bsrc import read_bsrc
-from nrdf.benchmark.objects import read_objects
+from nrdf.benchmark.objects import LabelledMesh, read_objects
 from nrdf.cloud import read_cloud
 from nrdf.errors import DataError, NrdfError
 from nrdf.field.kind import KindNetwork
@@ -35,6 +35,8 @@ DOUBTED, PASSED, SCANS = 0.95, 0.03, 0.05
 """At least so many of what is wrong must be doubted, at most so many of what is right, of which
 scans brought in by alignment."""
 VIEWS = "3 views"
+FURNITURE = ("chair", "stool", "bench", "table", "desk")
+"""Categories of labelled meshes that are shown as other kinds."""
 OTHERS, PAIRS = "other objects", "two of the kind side by side"
 BACKWARDS = "turned by 180° about Y"
 
@@ -69,9 +71,12 @@ def real_objects(
             yield "BSRC", thing.name, thing.cloud.points
     if labelled is not None and (labelled / category).is_dir():
         for mesh in read_objects(labelled, [category]):
-            rng = np.random.default_rng(zlib.crc32(mesh.key.encode()))
-            skin = outer_skin(mesh.vertices, mesh.faces, scans.CLOUD_POINTS, rng)[1]
-            yield "labelled meshes", mesh.key, skin.points
+            yield "labelled meshes", mesh.key, _skin(mesh)
+
+
+def _skin(mesh: LabelledMesh) -> np.ndarray:
+    rng = np.random.default_rng(zlib.crc32(mesh.key.encode()))
+    return outer_skin(mesh.vertices, mesh.faces, scans.CLOUD_POINTS, rng)[1].points
 
 
 def other_objects(folder: Path, category: str, count: int, seed: int = 0) -> list[Path]:
@@ -129,6 +134,15 @@ def evaluate_kind(
         if progress is not None:
             progress(done, total)
     return figures
+
+
+def labelled_figures(network: KindNetwork, category: str, labelled: Path) -> Iterator[Figure]:
+    """Furniture of other categories, of which some is sat on too: told apart, without a bar."""
+    for kind in FURNITURE:
+        if kind != category and (labelled / kind).is_dir():
+            for mesh in read_objects(labelled, [kind]):
+                said = _check(network, category, _skin(mesh))
+                yield _figure(f"labelled meshes: {kind}", mesh.key, False, said)
 
 
 def scan_figures(judge: Judge, shapes: Path, every: int) -> Iterator[Figure]:

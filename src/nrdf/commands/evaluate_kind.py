@@ -34,7 +34,8 @@ def kind(
         shapes: Folder with index.csv (category, shape, split) and category/shape.ply; those of the
             test split are used.
         bsrc: BSRC's folder; its clouds are taken as they are.
-        labelled: Labelled meshes, as `nrdf eval objects` takes them; those of the category.
+        labelled: Labelled meshes, as `nrdf eval objects` takes them; those of the category, and
+            other furniture, of which some is sat on too, without a bar.
         others: Folder of meshes of everyday objects, +Y up, any heading; of the half that training
             leaves out, those are drawn that are none of the category by their names.
         count: How many of them.
@@ -56,6 +57,8 @@ def kind(
     foreign = [] if others is None else benchmark.other_objects(others, category, count)
     with progress_bar("objects") as progress:
         figures = benchmark.evaluate_kind(asked, category, right, foreign, progress)
+    if labelled is not None:
+        figures += benchmark.labelled_figures(asked, category, labelled)
     if scans_every and shapes is not None:
         model = nrdf.load_model(category)
         model.kind_network = asked

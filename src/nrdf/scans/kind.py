@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 LEAST = 0.3
 """Probability that an object stands upright and faces forward, below which it is doubted."""
-FOREIGN = 0.5
-"""Cost above the usual one (`nrdf.scans.judge`) from which, without a network, it is doubted."""
-STRANGEST = 1.65
+FOREIGN, FOREIGN_TO_ONE = 0.5, 0.55
+"""Cost above the usual one (`nrdf.scans.judge`) from which, without a network, it is doubted; the
+second where one object is all that is known."""
+STRANGEST, STRANGEST_TO_ONE = 1.65, 3.0
 """Standard deviations of its proportions from the known objects', likewise."""
 _COUNTED = 2048  # points in which objects are counted
 FITS = "upright and facing forward"
@@ -174,7 +175,10 @@ def by_judge(judge: Judge, cost: float, points: np.ndarray) -> KindCheck:
     cost: at which it explains them.
     """
     category, strangeness = judge.model.category or "known object", judge.strangeness(points)
-    if cost < judge.usual_cost + FOREIGN and strangeness < STRANGEST:
+    foreign, strangest = FOREIGN, STRANGEST
+    if judge.prototypes == 1:
+        foreign, strangest = FOREIGN_TO_ONE, STRANGEST_TO_ONE
+    if cost < judge.usual_cost + foreign and strangeness < strangest:
         return KindCheck(category, "like what is known of its kind")
     warning = (
         f"the target does not look like a {category} standing upright and facing +X: the field "

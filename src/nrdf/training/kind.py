@@ -48,6 +48,7 @@ from nrdf.training.small import Settings, fastest, run_steps, small_run, write_s
 
 _SHARES = {"forward": 0.22, "turned": 0.28, "askew": 0.08, "tilted": 0.07, "other": 0.35}
 """How often a step shows what."""
+_LICENCE = "as the folder says"
 _PAIRS = 0.12  # of the others are two objects side by side
 _BOXES = 300  # heaps of boxes
 _LOOSE_YAW, _LOOSE_TILT = np.radians([10.0, 5.0])
@@ -134,8 +135,10 @@ def train_kind(
         strange = join([load_views(spared)]) if spared else foreign
         scores = validate(network, validation, strange, settings)
         sources: dict[str, Any] = provenance([*entries, *shapes])
-        if shown:
-            sources["meshes of other kinds"] = {"count": len(shown), "licences": {"": len(shown)}}
+        for folder in others:
+            if count := sum(folder in mesh.parents for mesh in shown):
+                said = {"count": count, "licences": {_LICENCE: count}}
+                sources[f"meshes of other kinds ({folder.name})"] = said
         return write_small(out, network, category, settings, sources, scores)
 
 
