@@ -6,6 +6,7 @@ The others are meshes of everyday objects of which training has seen none of the
 
 from __future__ import annotations
 
+import logging
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,18 +17,19 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.benchmark import scans
 from nrdf.benchmark.bsrc import read_bsrc
-from nrdf.benchmark.objects import LabelledMesh, read_objects
-from nrdf.cloud import read_cloud
-from nrdf.errors import DataError, NrdfError
+from nrdf.benchmark.objects import read_objects
+from nrdf.errors import DataError
 from nrdf.field.kind import KindNetwork
 from nrdf.geometry import canonical_transform, thin
-from nrdf.mesh import outer_skin
+from nrdf.mesh import load_mesh, outer_skin
 from nrdf.regions.model import WORKING_POINTS
 from nrdf.scans.judge import Judge
 from nrdf.scans.kind import KindCheck, check_points
 from nrdf.scans.target import bring_in
 from nrdf.shapes.prepare import find_meshes
 from nrdf.training.kind import is_held_out
+
+log = logging.getLogger(__name__)
 
 OWN = {"chair": ("chair", "stool", "bench"), "car": (), "plane": ("glider",)}
 """Words in names of everyday objects that are of the category, or sat on as such: no others."""
@@ -71,12 +73,13 @@ def real_objects(
             yield "BSRC", thing.name, thing.cloud.points
     if labelled is not None and (labelled / category).is_dir():
         for mesh in read_objects(labelled, [category]):
-            yield "labelled meshes", mesh.key, _skin(mesh)
+            yield "labelled meshes", mesh.key, _skin(mesh.key, mesh.vertices, mesh.faces)
 
 
-def _skin(mesh: LabelledMesh) -> np.ndarray:
-    rng = np.random.default_rng(zlib.crc32(mesh.key.encode()))
-    return outer_skin(mesh.vertices, mesh.faces, scans.CLOUD_POINTS, rng)[1].points
+def _skin(name: str, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of a mesh's outer skin."""
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    return outer_skin(vertices, faces, scans.CLOUD_POINTS, rng)[1].points
 
 
 def other_objects(folder: Path, category: str, count: int, seed: int = 0) -> list[Path]:
@@ -125,9 +128,10 @@ def evaluate_kind(
             progress(done, total)
     for path in others:
         try:
-            points = read_cloud(path, scans.CLOUD_POINTS).points
-        except NrdfError:
-            continue  # a mesh that cannot be read is never a target
+            points = _skin(path.stem, *load_mesh(path))
+        except DataError as error:
+            log.warning("left out: %s", error)
+            continue
         said = _check(network, category, points)
         figures.append(_figure(OTHERS, path.stem, False, said))
         done += 1
@@ -141,7 +145,7 @@ def labelled_figures(network: KindNetwork, category: str, labelled: Path) -> Ite
     for kind in FURNITURE:
         if kind != category and (labelled / kind).is_dir():
             for mesh in read_objects(labelled, [kind]):
-                said = _check(network, category, _skin(mesh))
+                said = _check(network, category, _skin(mesh.key, mesh.vertices, mesh.faces))
                 yield _figure(f"labelled meshes: {kind}", mesh.key, False, said)
 
 

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 def evaluations() -> dict[str, Callable[..., Any]]:
     """Score: BSRC (bsrc), labelled meshes (objects), exact truth (families, carry, scans), shapes
-    (shape), plans (toolpaths); fit what tells absent regions (presence).
+    (shape), plans (toolpaths), what targets are taken for (kind); fit what tells absent regions
+    (presence).
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """
