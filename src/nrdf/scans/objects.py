@@ -42,8 +42,10 @@ def separate_objects(points: np.ndarray, up: np.ndarray | None = None) -> np.nda
     few = points[thin(points, _POINTS, np.random.default_rng(0))]
     low, high = bounding_box(few)
     side = float((high - low).max())
-    if side > 0.0:  # where very many lie close together, a few stand for them
-        few = few[one_per_cell(few, low, _CELL * side)]
+    if side == 0.0:
+        return np.zeros(len(points), dtype=np.int64)
+    # Where very many lie close together, a few stand for them.
+    few = few[one_per_cell(few, low, _CELL * side)]
     label = _parts(few)
     if label.max() > 0:
         label = _put_together(few, label, up)
