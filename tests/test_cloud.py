@@ -397,3 +397,14 @@ def test_sensors_that_stand_nowhere_are_refused(place):
         PointCloud(WHOLE, sensors=[[0.0, place, 0.0]])
     with pytest.raises(CloudError, match="sensors must have the shape"):
         PointCloud(WHOLE, sensors=[1.0, 2.0])
+
+
+def test_what_a_file_claims_of_its_sensors_is_refused_with_its_name(tmp_path):
+    file = tmp_path / "far.ply"
+    rows = "\n".join("0 1 2" for _ in range(4))
+    head = "ply\nformat ascii 1.0\ncomment sensor 1e30 2 3\nelement vertex 4\n"
+    file.write_text(
+        f"{head}property float x\nproperty float y\nproperty float z\nend_header\n{rows}\n"
+    )
+    with pytest.raises(CloudError, match=r"far\.ply: a sensor's place is 1e\+30"):
+        read_cloud(file)

@@ -118,7 +118,11 @@ def read_cloud(
         raise CloudError(f"cannot read {path}: {error.strerror or error}") from error
     values = vars(raw)
     gaps = values.pop("gaps")
-    return _clean(path, PointCloud(**values), gaps)
+    try:
+        cloud = PointCloud(**values)
+    except CloudError as error:
+        raise CloudError(f"{path}: {error}") from None
+    return _clean(path, cloud, gaps)
 
 
 def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
