@@ -174,10 +174,11 @@ def command_seconds(weights: Path, device: str, folder: Path) -> float:
 
 
 def _weights(preset: str, folder: Path) -> tuple[Path, str]:
-    """A weight file of a preset: the zoo's, or untrained weights written into `folder`."""
+    """A weight file of a preset: the zoo's, that of the examples' category where there is one, or
+    untrained weights written into `folder`."""
     from nrdf.field.zoo import find_weights
 
-    for entry in list_models():
+    for entry in sorted(list_models(), key=lambda entry: entry.category != CATEGORY):
         if entry.preset == preset:
             return find_weights(entry.name), entry.name
     path = folder / "untrained.safetensors"

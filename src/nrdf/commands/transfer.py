@@ -69,7 +69,7 @@ def transfer(
         topic: What to read of a ROS 2 bag that has clouds under several topics.
         region: Region files of the target, marked by hand, named after taught regions: they are
             taken instead of what is found.
-        min_confidence: Regions found with less mean confidence are taken to be absent (0.2).
+        min_confidence: Regions found with less mean confidence are skipped (0.25).
         min_coverage: Limit on the share of each whole region, as it was found, that its tool works,
             0 to 1.
         max_line_spacing_mm: Limit on the distance between neighbouring lines.
