@@ -272,7 +272,7 @@ def test_all_steps(person, studio, tmp_path):
 
     person.drag_on(REFERENCE, behind, seat, lambda: along() > 0.9)
     until(lambda: person.planned("back") and person.planned("seat"), "the plans")
-    person.reads("worked")
+    person.reads("% missed")
     person.shoot("process")
 
     # 4: both on another chair; likeness; a doubtful region is painted by hand.
