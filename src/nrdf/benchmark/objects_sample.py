@@ -19,7 +19,6 @@ from nrdf.similarity import Similarity
 POINTS = 8192
 FLOOR = ""
 """The label of points that are not of the object."""
-NORMALS = ("estimated", "given")
 
 
 @dataclass(frozen=True)

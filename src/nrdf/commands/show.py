@@ -177,7 +177,7 @@ def _from_scan(folder: Path, teacher: Teacher) -> Transferred:
     seen = aligned.embed_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
-    return teacher.transfer(seen, doubts=aligned.doubts)
+    return teacher.transfer(seen, doubts=aligned.doubts, kind=aligned.kind)
 
 
 def _simulate(folder: Path) -> dict[str, Any] | None:
