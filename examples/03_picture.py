@@ -4,7 +4,7 @@ python examples/03_picture.py
 """
 
 from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-from nrdf.picture import Panel, draw_regions
+from nrdf.viz.picture import Panel, draw_regions
 
 panels = []
 for name in (REFERENCE, *TARGETS):

@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.export.options import Options
 from nrdf.export.registry import export_job
-from nrdf.process.toolpath import Job, Segment, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 DOWN = (1.0, 0.0, 0.0, 0.0)  # xyzw: tool z down into the table, tool x along +X
 BACK = (0.0, 1.0, 0.0, 0.0)  # the same, tool x along -X
@@ -23,7 +23,7 @@ for line, y in enumerate(np.arange(0.0, 0.1, 0.025)):  # a raster in snake order
     segments += [
         Segment("approach", line, np.stack([above[0], on[0]]), turned[:2], feed_m_s=0.1),
         Segment("process", line, on, turned, feed_m_s=0.05, force_n=15.0),
-        Segment("departure", line, np.stack([on[-1], above[-1]]), turned[:2], feed_m_s=0.1),
+        Segment("retract", line, np.stack([on[-1], above[-1]]), turned[:2], feed_m_s=0.1),
     ]
 sanding = ToolPath("table top", "sand", "disc", tool_radius_m=0.03, segments=tuple(segments))
 job = Job("table", "fixture", (sanding,))

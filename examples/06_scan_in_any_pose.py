@@ -7,10 +7,10 @@ import numpy as np
 
 import nrdf
 from nrdf.bundled import bundled_chair
+from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.scans.simulate import ScanSettings, simulate_scan
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import tessellate
-from nrdf.similarity import Similarity, about_up, up_axis, upright
 
 # Three depth cameras around a chair of 0.9 m that stands on a floor, z up, turned by 2 rad.
 mesh = tessellate(get_family("chair").member(1_000_003))  # vertices (v, 3), faces (f, 3)

@@ -13,12 +13,12 @@ import pytest
 
 from nrdf import cli
 from nrdf.bundled import REAL, bundled_chair
-from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.field.zoo import find_weights, list_models, load_field
-from nrdf.ply import read_header, read_scalars
-from nrdf.process.lesson import read_lesson
+from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
+from nrdf.io.ply import read_header, read_scalars
+from nrdf.io.swap import MANIFEST
+from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.transfer import MIN_CONFIDENCE
-from nrdf.swap import MANIFEST
 
 VERBS = sorted(cli.verbs())
 
@@ -202,7 +202,7 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(retrieve, tmp_path, monkeypatch
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("nrdf.picture.draw_regions", interrupted)
+    monkeypatch.setattr("nrdf.viz.picture.draw_regions", interrupted)
     assert retrieve() == 130
     assert list(tmp_path.iterdir()) == []
 
@@ -230,7 +230,7 @@ def test_unexpected_errors_keep_their_traceback(retrieve, tmp_path, monkeypatch)
     def broken(*arguments):
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr("nrdf.picture.draw_regions", broken)
+    monkeypatch.setattr("nrdf.viz.picture.draw_regions", broken)
     with pytest.raises(ZeroDivisionError):
         retrieve()
     assert list(tmp_path.iterdir()) == []
@@ -273,7 +273,7 @@ def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path
     again = json.loads((result / "report.json").read_text())["regions"]["seat"]
     assert again["points"] == seat["found"]
     taught, _ = bundled_chair("reference")
-    lesson = read_lesson(out / "chair.yaml")
+    lesson = read_bound_knowledge(out / "chair.yaml")
     np.testing.assert_allclose(lesson.cloud.points, taught.points, atol=1e-6)
 
 

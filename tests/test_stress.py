@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from export_jobs import small_job
+from builders.export_jobs import small_job
+from builders.taught_box import cloud
 from nrdf import cli
 from nrdf.errors import OutputError
 from nrdf.export.registry import export_job
-from nrdf.locks import claim
-from nrdf.process.toolpath import write_job
-from nrdf.swap import MANIFEST
-from taught_box import cloud
+from nrdf.io.locks import claim
+from nrdf.io.swap import MANIFEST
+from nrdf.toolpath.types import write_job
 
 LIMITED = """
 import resource, sys
@@ -53,7 +53,7 @@ import resource, sys
 from pathlib import Path
 from nrdf.errors import OutputError
 from nrdf.export.registry import FORMATS, export_job
-from nrdf.process.toolpath import read_job
+from nrdf.toolpath.types import read_job
 import rosbags.rosbag2
 job = read_job(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
@@ -201,7 +201,7 @@ def test_a_scan_and_its_truth_are_as_they_were_where_writing_fails(tmp_path, mon
     def full(*_):
         raise OutputError("cannot write scan.json: No space left on device")
 
-    monkeypatch.setattr("nrdf.output.write_json", full)
+    monkeypatch.setattr("nrdf.io.output.write_json", full)
     assert cli.run([*words, "--seed", "1"]) == 2
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
 
@@ -234,26 +234,26 @@ def test_no_cell_of_an_exported_table_is_a_formula(tmp_path):
 
 
 def test_a_picture_on_a_full_disk_is_an_output_error(tmp_path, monkeypatch):
-    from nrdf.robot import pictures
+    from nrdf.robot.report import pictures
 
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("nrdf.ply.os.replace", full)
+    monkeypatch.setattr("nrdf.io.ply.os.replace", full)
     with pytest.raises(OutputError, match="No space left on device; free some space"):
         pictures._save(tmp_path / "x.png", np.zeros((8, 8, 3), np.uint8))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_report_is_whole_or_as_it_was(tmp_path, monkeypatch):
-    from nrdf.output import write_json
+    from nrdf.io.output import write_json
 
     write_json(tmp_path / "x.json", {"a": 1})
 
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("nrdf.ply.os.replace", full)
+    monkeypatch.setattr("nrdf.io.ply.os.replace", full)
     with pytest.raises(OutputError, match="No space"):
         write_json(tmp_path / "x.json", {"a": 2})
     assert json.loads((tmp_path / "x.json").read_text()) == {"a": 1}
@@ -264,7 +264,7 @@ def test_regions_that_would_be_one_file_are_refused(tmp_path, capsys):
     whole = cloud()
     np.savez(tmp_path / "two.npz", Seat=np.arange(9), seat=np.arange(9))
     np.savez(tmp_path / "device.npz", nul=np.arange(9))
-    from nrdf.cloud import write_cloud
+    from nrdf.io.cloud import write_cloud
 
     write_cloud(tmp_path / "box.ply", whole)
     for file, message in (("two", "would be one file"), ("device", "Windows keeps nul")):

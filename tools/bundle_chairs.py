@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.bundled import KNOWLEDGE, REAL, REFERENCE, REGIONS_FILE, bundled_chair
-from nrdf.process.lesson import checksum
+from nrdf.process.bound_knowledge import checksum
 from nrdf.shapes.families import get_family
 
 BUNDLED = Path(__file__).resolve().parents[1] / "src" / "nrdf" / "bundled"

@@ -17,7 +17,7 @@ from playwright.sync_api import sync_playwright
 
 import nrdf
 from nrdf.bundled import KNOWLEDGE, REFERENCE, TARGETS
-from nrdf.process.lesson import read_lesson
+from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.studio.app import Studio
 from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
@@ -34,7 +34,7 @@ def main() -> None:
     server = open_server("127.0.0.1", 8490)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         studio = Studio(Session(folder), server, nrdf.load_model, ["chair"], {})
-        studio.desk.open_lesson(REFERENCE, read_lesson(KNOWLEDGE))
+        studio.desk.open_lesson(REFERENCE, read_bound_knowledge(KNOWLEDGE))
         studio.desk.add_target(TARGETS[2], bundled(TARGETS[2]))
         studio.restore()
         studio.worker.wait(300)

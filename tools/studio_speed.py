@@ -16,10 +16,10 @@ import numpy as np
 import nrdf
 from nrdf.bundled import REFERENCE as CHAIR
 from nrdf.bundled import TARGETS, bundled_chair
-from nrdf.studio.bench import Bench
-from nrdf.studio.body import REFERENCE
-from nrdf.studio.desk import Desk
 from nrdf.studio.drawing import colours_of
+from nrdf.studio.editor import Desk
+from nrdf.studio.paintable_cloud import REFERENCE
+from nrdf.studio.result_cache import Bench
 from nrdf.studio.session import Session
 from nrdf.studio.uploads import bundled
 

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from nrdf.cloud import PointCloud, read_cloud, write_cloud
     from nrdf.errors import (
         CloudError,
         ConfigError,
@@ -32,18 +31,20 @@ if TYPE_CHECKING:
         RegionError,
         TrainingError,
     )
-    from nrdf.inputs import as_cloud
+    from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
+    from nrdf.io.inputs import as_cloud
     from nrdf.process.knowledge import Knowledge
-    from nrdf.process.transfer import Teacher, Transferred
+    from nrdf.process.transfer import ProcessTransfer, TransferResult
     from nrdf.regions.match import Match
     from nrdf.regions.model import Model
-    from nrdf.regions.taught import Taught
+    from nrdf.regions.reference import EncodedReference
     from nrdf.scans.target import align
 
 __all__ = [
     "CloudError",
     "ConfigError",
     "DataError",
+    "EncodedReference",
     "Knowledge",
     "LimitError",
     "Match",
@@ -54,11 +55,10 @@ __all__ = [
     "OutputError",
     "PointCloud",
     "ProcessError",
+    "ProcessTransfer",
     "RegionError",
-    "Taught",
-    "Teacher",
     "TrainingError",
-    "Transferred",
+    "TransferResult",
     "__version__",
     "align",
     "as_cloud",
@@ -71,12 +71,12 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOMES = {
-    **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.cloud"),
-    "as_cloud": "nrdf.inputs",
+    **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.io.cloud"),
+    "as_cloud": "nrdf.io.inputs",
     "Match": "nrdf.regions.match",
     "Model": "nrdf.regions.model",
-    "Taught": "nrdf.regions.taught",
-    **dict.fromkeys(("Teacher", "Transferred"), "nrdf.process.transfer"),
+    "EncodedReference": "nrdf.regions.reference",
+    **dict.fromkeys(("ProcessTransfer", "TransferResult"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     "align": "nrdf.scans.target",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
@@ -98,18 +98,20 @@ def load_model(name: str | Path, device: str = "cpu") -> Model:
     return Model(field, metadata, device=choose_device(device))
 
 
-def teach(knowledge: str | Path, model: Model | None = None) -> Teacher:
+def teach(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
     """Process knowledge from its file, on its reference, ready to be transferred to targets.
 
     `model` is the knowledge's category in the zoo unless given. Raises ProcessError for knowledge
     that is wrong somewhere, naming field and value, CloudError for a reference that cannot be used,
     and ModelError for a model of another category.
     """
-    from nrdf.process.lesson import read_lesson
-    from nrdf.process.transfer import Teacher
+    from nrdf.process.bound_knowledge import read_bound_knowledge
+    from nrdf.process.transfer import ProcessTransfer
 
-    lesson = read_lesson(knowledge)
-    return Teacher(lesson, load_model(lesson.knowledge.category) if model is None else model)
+    lesson = read_bound_knowledge(knowledge)
+    return ProcessTransfer(
+        lesson, load_model(lesson.knowledge.category) if model is None else model
+    )
 
 
 def __getattr__(name: str) -> Any:

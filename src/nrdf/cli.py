@@ -45,9 +45,7 @@ GROUPS = ("eval", "knowledge")
 
 def verbs() -> dict[str, Callable[..., Any]]:
     """Name to function; their modules import nothing heavy."""
-    from nrdf.commands.ablate import ablate
     from nrdf.commands.align import align
-    from nrdf.commands.evaluate import bench, evaluations
     from nrdf.commands.export import export
     from nrdf.commands.information import info, zoo
     from nrdf.commands.kind import kind
@@ -61,6 +59,8 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.train import train
     from nrdf.commands.transfer import transfer
     from nrdf.commands.yaw import yaw
+    from nrdf_benchmark.commands.ablate import ablate
+    from nrdf_benchmark.commands.evaluate import bench, evaluations
 
     return {
         "retrieve": retrieve,
@@ -184,7 +184,7 @@ def _with_joined_lines(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 def _with_checked_numbers(verb: Callable[..., Any]) -> Callable[..., Any]:
     """The verb, called only with numbers that are within its annotations' bounds."""
-    from nrdf.bounds import check_numbers
+    from nrdf.io.bounds import check_numbers
 
     @functools.wraps(verb)
     def checked(*given: Any, **named: Any) -> Any:

@@ -1,3 +1,3 @@
 """Registers the profile "fuzz" before any test asks for it."""
 
-import fuzzing  # noqa: F401
+from builders import fuzzing  # noqa: F401

@@ -6,15 +6,15 @@ import io
 
 import numpy as np
 import pytest
-from fuzzing import outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from nrdf.cloud import PointCloud, check_cloud, read_cloud, write_cloud
+from builders.fuzzing import outcome_of, tries
 from nrdf.errors import CloudError
-from nrdf.inputs import as_cloud
-from nrdf.mesh import FARTHEST
+from nrdf.geometry.mesh import FARTHEST
+from nrdf.io.cloud import PointCloud, check_cloud, read_cloud, write_cloud
+from nrdf.io.inputs import as_cloud
 
 VALUES = st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-300, 1e-30, 1e30, 1e160, -1e300, 1.7e308])
 ODD = st.sampled_from([np.nan, np.inf, -np.inf, 5e-324])

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from fuzzing import outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 
-from awkward import OFFSETS, SCALES, clouds
-from nrdf.cloud import PointCloud
-from nrdf.process.transfer import Teacher
+from builders.awkward import OFFSETS, SCALES, clouds
+from builders.fuzzing import outcome_of, tries
+from builders.taught_box import SAND, cloud, lesson
+from builders.tiny_field import TinyField
+from nrdf.io.cloud import PointCloud
+from nrdf.process.transfer import ProcessTransfer
 from nrdf.regions.model import Model
 from nrdf.scans.clean import clean_scan
 from nrdf.scans.target import align
-from taught_box import SAND, cloud, lesson
-from tiny_field import TinyField
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 SENSORS = (None, [0, 0, 0], [3, 0, 0], [1e4, 0, 0], [1e30, 0, 0], [np.nan, 0, 0], [np.inf, 0, 0])
@@ -30,7 +30,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def teacher(model):
-    return Teacher(lesson({"top": [SAND]}, cloud(count=800)), model)
+    return ProcessTransfer(lesson({"top": [SAND]}, cloud(count=800)), model)
 
 
 @st.composite

@@ -8,9 +8,9 @@ import time
 
 import numpy as np
 import pytest
-from fuzzing import altered, damaged, message_of, outcome_of, tries
 from hypothesis import Phase, find, given, settings
 
+from builders.fuzzing import altered, damaged, message_of, outcome_of, tries
 from nrdf.errors import CloudError
 
 

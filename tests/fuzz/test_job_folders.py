@@ -11,17 +11,17 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from fuzzing import altered, damaged, outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 
 import nrdf
+from builders.fuzzing import altered, damaged, outcome_of, tries
 from nrdf.errors import NrdfError
 from nrdf.export.registry import export_job
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.knowledge_file import write_knowledge
-from nrdf.process.toolpath import Job, Segment, ToolPath, read_job, write_job
-from nrdf.similarity import Similarity, up_axis, upright
+from nrdf.toolpath.types import Job, Segment, ToolPath, read_job, write_job
 
 WRITTEN = ("csv", "json", "urscript", "krl")
 
@@ -70,7 +70,7 @@ def use(folder):
     export_job(whole, WRITTEN, out)
     if find_spec("mujoco") is None:
         return whole, None
-    from nrdf.robot.simulate import read_work
+    from nrdf.robot.simulation.simulate import read_work
 
     return whole, read_work(folder)
 

@@ -6,18 +6,18 @@ import json
 
 import pytest
 import yaml
-from fuzzing import altered, damaged, message_of, outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nrdf.cloud import write_cloud
+from builders.fuzzing import altered, damaged, message_of, outcome_of, tries
+from builders.taught_box import SAND, cloud, faces
 from nrdf.errors import NrdfError
-from nrdf.process import effort
+from nrdf.io.cloud import write_cloud
+from nrdf.process.bound_knowledge import BoundKnowledge, bind
+from nrdf.process.check import Checked, check
 from nrdf.process.knowledge import Knowledge
-from nrdf.process.knowledge_check import Checked, check
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
-from nrdf.process.lesson import Lesson, bind
-from taught_box import SAND, cloud, faces
+from nrdf.toolpath import effort
 
 BOX = cloud(count=600)
 TOP = faces(BOX)["top"]
@@ -79,7 +79,7 @@ def use(folder, knowledge):
     write_knowledge(folder / "again.yaml", read_knowledge(folder / "again.yaml"))
     assert (folder / "again.yaml").read_bytes() == written  # but for a number's last digits
     lesson = outcome_of(lambda: bind(knowledge, folder))
-    if isinstance(lesson, Lesson):
+    if isinstance(lesson, BoundKnowledge):
         for row in outcome_of(lambda: check(lesson)):
             assert isinstance(row, Checked) and (row.fault == "") == (row.measures is not None)
 

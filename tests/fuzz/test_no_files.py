@@ -6,12 +6,12 @@ import json
 import os
 
 import pytest
-from fuzzing import message_of
 
-from nrdf.cloud import PointCloud, write_cloud
-from nrdf.process.lesson import checksum, read_lesson
-from nrdf.process.toolpath import read_job
-from solids import box
+from builders.fuzzing import message_of
+from builders.solids import box
+from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
+from nrdf.toolpath.types import read_job
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 
@@ -23,7 +23,7 @@ def lesson(folder, reference="ref.ply", region="region.ply"):
     regions = [{"name": "top", "file": region, "processes": [SAND]}]
     content = {"category": "chair", "reference": {"cloud": reference}, "regions": regions}
     (folder / "k.json").write_text(json.dumps(content))
-    return read_lesson(folder / "k.json")
+    return read_bound_knowledge(folder / "k.json")
 
 
 def test_knowledge_of_files_is_read(tmp_path):
@@ -42,7 +42,7 @@ def test_is_refused_at_once(tmp_path, kind, said, place):
         "reference": lambda: lesson(tmp_path, reference=odd.name),
         "region": lambda: lesson(tmp_path, region=odd.name),
         "region array": lambda: lesson(tmp_path, region=odd.name),
-        "knowledge": lambda: read_lesson(odd),
+        "knowledge": lambda: read_bound_knowledge(odd),
         "job": lambda: read_job(odd),
     }[place]
     message = message_of(call)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fuzzing import damaged, outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
-from valid_files import CLOUDS, MESHES
 
-from nrdf.cloud import PointCloud, read_cloud
+from builders.fuzzing import damaged, outcome_of, tries
+from builders.valid_files import CLOUDS, MESHES
 from nrdf.errors import CloudError, DataError
-from nrdf.mesh import load_mesh
+from nrdf.geometry.mesh import load_mesh
+from nrdf.io.cloud import PointCloud, read_cloud
 
 
 @pytest.fixture

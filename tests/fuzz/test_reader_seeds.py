@@ -13,11 +13,11 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
-from fuzzing import message_of, outcome_of
-from valid_files import CLOUDS, COLOURS, MESHES, NORMALS, POINTS
 
-from nrdf.cloud import PointCloud, read_cloud
+from builders.fuzzing import message_of, outcome_of
+from builders.valid_files import CLOUDS, COLOURS, MESHES, NORMALS, POINTS
 from nrdf.errors import RegionError
+from nrdf.io.cloud import PointCloud, read_cloud
 from nrdf.regions.files import read_region_file
 
 BOX = trimesh.creation.box()

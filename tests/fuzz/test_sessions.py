@@ -8,18 +8,18 @@ import shutil
 
 import numpy as np
 import pytest
-from fuzzing import altered, damaged, outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 
+from builders.fuzzing import altered, damaged, outcome_of, tries
+from builders.taught_box import SIZE, cloud, faces
 from nrdf.errors import NrdfError
 from nrdf.studio.colours import painted_colours
-from nrdf.studio.desk import Desk
 from nrdf.studio.document import REFERENCE
+from nrdf.studio.editor import Desk
 from nrdf.studio.session import Session
 from nrdf.studio.session_file import FILE
 from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
-from taught_box import SIZE, cloud, faces
 
 
 @pytest.fixture(scope="module")

@@ -8,23 +8,23 @@ import json
 import numpy as np
 import pytest
 import torch
-from fuzzing import altered, damaged, outcome_of, tries
 from hypothesis import given
 from hypothesis import strategies as st
 from safetensors.torch import save
 
+from builders.fuzzing import altered, damaged, outcome_of, tries
+from builders.tiny_field import TinyConfig, TinyField
 from nrdf.errors import ModelError, NrdfError, RegionError
 from nrdf.field import PRESETS
 from nrdf.field.base import Field
 from nrdf.field.weights import FORMAT, _digest, load_weights
 from nrdf.field.zoo import ZooEntry, list_models
 from nrdf.regions.files import read_region_file
-from tiny_field import TinyConfig, TinyField
 
 
 @pytest.fixture(autouse=True)
 def tiny_preset(monkeypatch):
-    monkeypatch.setitem(PRESETS, "tiny", "tiny_field:TinyField")
+    monkeypatch.setitem(PRESETS, "tiny", "builders.tiny_field:TinyField")
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
 from nrdf.errors import DataError, unknown_name
-from nrdf.mesh import Mesh
+from nrdf.geometry.mesh import Mesh
+from nrdf.io.cloud import PointCloud
 
 REFERENCE = "reference"
 TARGETS = ("ladder-back", "rocker", "armchair")

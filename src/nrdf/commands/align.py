@@ -20,10 +20,10 @@ from nrdf.commands.console import (
 )
 
 if TYPE_CHECKING:
-    from nrdf.cloud import PointCloud
-    from nrdf.picture import Panel
+    from nrdf.io.cloud import PointCloud
     from nrdf.regions.model import Model
     from nrdf.scans.target import AlignedScan
+    from nrdf.viz.picture import Panel
 
 log = logging.getLogger(__name__)
 
@@ -74,12 +74,12 @@ def align(
             an unlikely unit.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.output import output_folder
+    from nrdf.io.output import output_folder
 
     with output_folder(out, overwrite, [scan, *reference, model]) as folder:
         import nrdf
-        from nrdf.cloud import PointCloud
-        from nrdf.picture import draw_regions
+        from nrdf.io.cloud import PointCloud
+        from nrdf.viz.picture import draw_regions
 
         loaded = nrdf.load_model(model, device)
         examples = [nrdf.read_cloud(path) for path in reference]
@@ -190,7 +190,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
 
 def pose_panels(found: AlignedScan) -> list[Panel]:
     """The object in each likely pose, as the category's frame has it."""
-    from nrdf.picture import Panel
+    from nrdf.viz.picture import Panel
 
     seen, panels = found.embed(), []
     for candidate in found.alignment.likely[:MOST_POSES]:

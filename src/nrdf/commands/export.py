@@ -33,8 +33,8 @@ def export(
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.export.registry import check_formats, export_job
-    from nrdf.output import output_folder
-    from nrdf.process.toolpath import read_job
+    from nrdf.io.output import output_folder
+    from nrdf.toolpath.types import read_job
 
     check_formats(format)
     content = read_job(job)

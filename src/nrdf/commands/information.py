@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
-from nrdf.bounds import FINITE
 from nrdf.commands.console import console, show, table, versions
 from nrdf.errors import ConfigError
+from nrdf.io.bounds import FINITE
 
 
 def info(as_json: bool = False) -> None:
@@ -109,7 +109,7 @@ def zoo(
         note: One line about this model.
     """
     from nrdf.field.zoo import ZOO, add_to_zoo
-    from nrdf.locks import claim
+    from nrdf.io.locks import claim
 
     with claim(ZOO):
         entry = add_to_zoo(weights, name, _parse_scores(scores), note)

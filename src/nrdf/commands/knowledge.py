@@ -12,8 +12,8 @@ from tyro.conf import Positional
 from nrdf.commands.console import console, errors, progress_bar, show, table
 
 if TYPE_CHECKING:
+    from nrdf.process.check import Checked
     from nrdf.process.knowledge import Process
-    from nrdf.process.knowledge_check import Checked
 
 log = logging.getLogger(__name__)
 
@@ -57,9 +57,9 @@ def new(
         overwrite: Replace the file if there is one.
     """
     from nrdf.errors import OutputError
-    from nrdf.output import output_file
+    from nrdf.io.output import output_file
     from nrdf.process.knowledge_file import write_knowledge
-    from nrdf.process.knowledge_new import PLACEHOLDER, new_knowledge
+    from nrdf.process.new_knowledge import PLACEHOLDER, new_knowledge
 
     if out.exists() and not overwrite:
         raise OutputError(f"{out} exists; give another name, or --overwrite to replace it")
@@ -90,12 +90,12 @@ def check(file: Positional[Path], model: str | None = None) -> None:
         model: Weight file or training run for a category that the zoo has no model for.
     """
     from nrdf.errors import ProcessError
+    from nrdf.process.bound_knowledge import read_bound_knowledge
     from nrdf.process.category import check_category
-    from nrdf.process.knowledge_check import check as check_on_reference
+    from nrdf.process.check import check as check_on_reference
     from nrdf.process.knowledge_file import listed
-    from nrdf.process.lesson import read_lesson
 
-    lesson = read_lesson(file)
+    lesson = read_bound_knowledge(file)
     with progress_bar("planning on the reference") as progress:
         checked = check_on_reference(lesson, progress)
     reference = lesson.knowledge.reference
@@ -133,7 +133,7 @@ def schema(out: Path | None = None) -> None:
     """
     import json
 
-    from nrdf.output import output_file, write_json
+    from nrdf.io.output import output_file, write_json
     from nrdf.process.knowledge import Knowledge
 
     content = {
@@ -168,7 +168,7 @@ def _show_asked(checked: list[Checked]) -> None:
 
 
 def _show_planned(checked: list[Checked], points: dict[str, int]) -> None:
-    from nrdf.process.report import SHORT_FIGURES, short_figures
+    from nrdf.reports.transfer_report import SHORT_FIGURES, short_figures
 
     shown = table("\nplanned on the reference", "region", "points", *SHORT_FIGURES)
     for row in checked:
@@ -179,7 +179,7 @@ def _show_planned(checked: list[Checked], points: dict[str, int]) -> None:
 
 
 def _said(process: Process, name: str) -> str:
-    from nrdf.units import in_words
+    from nrdf.geometry.units import in_words
 
     value = getattr(process, name)
     return "–" if value is None else in_words(name, value)

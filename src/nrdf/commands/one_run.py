@@ -17,7 +17,7 @@ def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Ar
     """A decorator: where the argument `name` gives a place, or several, no other run writes there.
 
     A second one is refused at once, before anything is computed, and so is a place that cannot be
-    written (`nrdf.locks.claim`).
+    written (`nrdf.io.locks.claim`).
     """
 
     def decorate(verb: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -25,7 +25,7 @@ def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Ar
 
         @wraps(verb)
         def alone(*values: Arguments.args, **named: Arguments.kwargs) -> Result:
-            from nrdf.locks import claim
+            from nrdf.io.locks import claim
 
             bound = signature.bind(*values, **named)
             bound.apply_defaults()

@@ -31,10 +31,10 @@ from nrdf.errors import CloudError, NothingFoundError
 if TYPE_CHECKING:
     import numpy as np
 
-    from nrdf.cloud import PointCloud
-    from nrdf.picture import Panel
-    from nrdf.regions.embedded import Embedded
+    from nrdf.field.encoded_cloud import EncodedCloud
+    from nrdf.io.cloud import PointCloud
     from nrdf.regions.match import Match
+    from nrdf.viz.picture import Panel
 
 log = logging.getLogger(__name__)
 
@@ -95,14 +95,14 @@ def retrieve(
             scan's pose.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.output import output_folder
+    from nrdf.io.output import output_folder
 
     doubts: list[str] = []
     with output_folder(out, overwrite, [reference, *region, target, model]) as folder:
         clock = Clock()
         import nrdf
-        from nrdf.picture import draw_regions
         from nrdf.regions.files import read_regions, write_matches
+        from nrdf.viz.picture import draw_regions
 
         loaded = nrdf.load_model(model, device)
         clock.lap("load model")
@@ -189,16 +189,16 @@ def reference_indices(
 def region_panel(
     title: str, cloud: PointCloud, regions: Mapping[str, np.ndarray], note: str = ""
 ) -> Panel:
-    from nrdf.picture import Panel
+    from nrdf.viz.picture import Panel
 
     return Panel(title, cloud.points, cloud.normals, dict(regions), note)
 
 
-def target_panel(title: str, embedded: Embedded, regions: Mapping[str, np.ndarray]) -> Panel:
+def target_panel(title: str, embedded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
     """An embedded cloud in the category's frame, with regions of the whole cloud's indices."""
     import numpy as np
 
-    from nrdf.picture import Panel
+    from nrdf.viz.picture import Panel
 
     shown = {name: np.isin(embedded.working, indices) for name, indices in regions.items()}
     return Panel(title, embedded.points, embedded.normals, shown)

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
-from nrdf.bounds import NotNegative, Positive, Seed, Within
 from nrdf.commands.console import command_line, console
+from nrdf.io.bounds import NotNegative, Positive, Seed, Within
 
 
 def scan(
@@ -59,12 +59,12 @@ def scan(
 
     import numpy as np
 
-    from nrdf.cloud import write_cloud
     from nrdf.errors import DataError
-    from nrdf.mesh import load_mesh
-    from nrdf.output import output_files, write_json
+    from nrdf.geometry.mesh import load_mesh
+    from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+    from nrdf.io.cloud import write_cloud
+    from nrdf.io.output import output_files, write_json
     from nrdf.scans.simulate import ScanSettings, simulate_scan
-    from nrdf.similarity import Similarity, about_up, up_axis, upright
 
     beside = out.with_suffix(".json")
     if out.suffix.lower() != ".ply":

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from nrdf.bounds import Count, Seed
 from nrdf.commands.console import console, errors, progress_bar
 from nrdf.commands.one_run import one_run_at
+from nrdf.io.bounds import Count, Seed
 
 
 @one_run_at("out")

@@ -21,8 +21,8 @@ from nrdf.commands.console import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from nrdf.picture import Panel
-    from nrdf.process.transfer import Teacher, Transferred
+    from nrdf.process.transfer import ProcessTransfer, TransferResult
+    from nrdf.viz.picture import Panel
 
 EXPORTED = ("urscript", "csv")
 SCAN_YAW, SCAN_PLACE_M = 2.1, (1.2, -0.7, 0.45)
@@ -57,7 +57,7 @@ def demo(
         overwrite: Replace an earlier demo in the output folder.
     """
     from nrdf.bundled import REAL, REFERENCE
-    from nrdf.output import output_folder
+    from nrdf.io.output import output_folder
 
     with output_folder(out, overwrite, [model]) as folder:
         results = _run(folder, model, device)
@@ -114,10 +114,10 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     import nrdf
     from nrdf.bundled import REAL, REFERENCE, TARGETS, bundled_chair
     from nrdf.export.registry import export_job
-    from nrdf.picture import draw_regions
-    from nrdf.process.job_folder import job_of, panel_of, write_transfer
     from nrdf.process.limits import Limits
-    from nrdf.process.transfer import Teacher
+    from nrdf.process.transfer import ProcessTransfer
+    from nrdf.reports.job_folder import job_of, panel_of, write_transfer
+    from nrdf.viz.picture import draw_regions
 
     loaded = nrdf.load_model(model, device)
     origin = {
@@ -128,7 +128,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     with progress_bar("chairs") as progress:
         every = (REAL, *TARGETS)
         progress(0, len(every) + 1)
-        teacher = Teacher(_write_lesson(folder), loaded)
+        teacher = ProcessTransfer(_write_lesson(folder), loaded)
         panels = [_taught_panel(REFERENCE, teacher)]
         results: list[Found] = []
         for done, chair in enumerate(every, 1):
@@ -152,19 +152,19 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     return results
 
 
-def _from_scan(folder: Path, teacher: Teacher) -> Transferred:
+def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     """The real chair: scanned, aligned, and worked; its figures are of its true mesh."""
     from dataclasses import replace
 
     import numpy as np
 
     from nrdf.bundled import REAL, bundled_mesh
-    from nrdf.cloud import write_cloud
-    from nrdf.mesh import Mesh
-    from nrdf.scans.judge import Judge
+    from nrdf.geometry.mesh import Mesh
+    from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+    from nrdf.io.cloud import write_cloud
+    from nrdf.scans.pose_scorer import PoseScorer
     from nrdf.scans.simulate import ScanSettings, simulate_scan
     from nrdf.scans.target import bring_in
-    from nrdf.similarity import Similarity, about_up, up_axis, upright
 
     mesh = bundled_mesh()
     turn = upright(up_axis("z")) @ about_up(SCAN_YAW)
@@ -173,7 +173,7 @@ def _from_scan(folder: Path, teacher: Teacher) -> Transferred:
     rng = np.random.default_rng(0)
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
-    aligned = bring_in(Judge(teacher.model), scan.cloud)
+    aligned = bring_in(PoseScorer(teacher.model), scan.cloud)
     seen = aligned.embed_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
@@ -190,9 +190,9 @@ def _simulate(folder: Path) -> dict[str, Any] | None:
         errors.print("no arm: pip install 'nrdf[robot]' for the simulation", style="yellow")
         return None
     from nrdf.errors import NrdfError
-    from nrdf.robot.arm import load_arm
-    from nrdf.robot.result import write_simulation
-    from nrdf.robot.simulate import read_work, simulate
+    from nrdf.robot.model.arm import load_arm
+    from nrdf.robot.report.folder import write_simulation
+    from nrdf.robot.simulation.simulate import read_work, simulate
 
     job = folder / REAL
     try:
@@ -210,12 +210,12 @@ def _simulate(folder: Path) -> dict[str, Any] | None:
 def _write_lesson(folder: Path) -> Any:
     """The bundled knowledge with its reference and regions as files that a user may change."""
     from nrdf.bundled import KNOWLEDGE, REFERENCE
-    from nrdf.cloud import write_cloud
+    from nrdf.io.cloud import write_cloud
+    from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
     from nrdf.process.knowledge import Reference
     from nrdf.process.knowledge_file import write_knowledge
-    from nrdf.process.lesson import checksum, read_lesson
 
-    lesson = read_lesson(KNOWLEDGE)
+    lesson = read_bound_knowledge(KNOWLEDGE)
     write_cloud(folder / f"{REFERENCE}.ply", lesson.cloud)
     (folder / REFERENCE).mkdir()
     regions = []
@@ -230,9 +230,9 @@ def _write_lesson(folder: Path) -> Any:
     return lesson
 
 
-def _taught_panel(title: str, teacher: Teacher) -> Panel:
+def _taught_panel(title: str, teacher: ProcessTransfer) -> Panel:
     """The reference with its regions, and what each process does there."""
-    from nrdf.picture import Panel
+    from nrdf.viz.picture import Panel
 
     lines: dict[str, list[np.ndarray]] = {}
     for region, number, _ in teacher.steps():
@@ -242,7 +242,7 @@ def _taught_panel(title: str, teacher: Teacher) -> Panel:
     return Panel(title, lesson.cloud.points, None, lesson.regions, note, lines)
 
 
-def _compare(chair: str, transferred: Transferred, truth: dict[str, np.ndarray]) -> list[Found]:
+def _compare(chair: str, transferred: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:
     rows = []
     for step in transferred.paths:
         match, measures = transferred.regions[step.region].match, step.measures
@@ -265,7 +265,7 @@ def _compare(chair: str, transferred: Transferred, truth: dict[str, np.ndarray])
     return rows
 
 
-def _note(found: list[Found], transferred: Transferred) -> str:
+def _note(found: list[Found], transferred: TransferResult) -> str:
     known = [row.iou for row in found if row.iou is not None]
     what = f"mean IoU {sum(known) / len(known):.2f}" if known else "a real chair, scanned"
     minutes = sum(row.cycle_time_s or 0.0 for row in found) / 60

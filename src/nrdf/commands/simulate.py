@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
-from nrdf.bounds import FINITE, Count, NotNegative, Seed
 from nrdf.commands.console import command_line, console, errors, progress_bar, show, table, versions
+from nrdf.io.bounds import FINITE, Count, NotNegative, Seed
 
 
 def simulate(
@@ -53,12 +53,12 @@ def simulate(
         seed: Of the random searches.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.output import output_folder
-    from nrdf.robot.arm import load_arm
-    from nrdf.robot.result import write_simulation
-    from nrdf.robot.simulate import read_work
-    from nrdf.robot.simulate import simulate as run
-    from nrdf.robot.solid import solid_from_file
+    from nrdf.io.output import output_folder
+    from nrdf.robot.model.arm import load_arm
+    from nrdf.robot.model.signed_distance import solid_from_file
+    from nrdf.robot.report.folder import write_simulation
+    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.simulate import simulate as run
 
     with output_folder(out, overwrite, [job, robot, mesh]) as folder:
         work = read_work(job, up)
@@ -84,7 +84,7 @@ def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[
     import numpy as np
 
     from nrdf.errors import RobotError
-    from nrdf.robot.cell import Placement
+    from nrdf.robot.model.cell import Placement
 
     if base == ("auto",):
         return None, turns or 12
@@ -104,7 +104,7 @@ def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[
 
 def show_simulation(report: dict[str, Any]) -> None:
     """A table of a simulation's tool paths, what to look at, and the whole."""
-    from nrdf.robot.figures import COLUMNS, figures
+    from nrdf.robot.report.metrics import COLUMNS, figures
 
     shown = table("", "region", "process", *COLUMNS, texts=2)
     for path in report["paths"]:

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from nrdf.bounds import Within
 from nrdf.commands.console import command_line, console, errors, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.io.bounds import Within
 
 
 @one_run_at("session")

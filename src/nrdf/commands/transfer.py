@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional
 
-from nrdf.bounds import NotNegative, Share, Within
 from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, stand_ins
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
+from nrdf.io.bounds import NotNegative, Share, Within
 
 _NAME_WIDTH = 12  # characters
 
 if TYPE_CHECKING:
-    from nrdf.cloud import PointCloud
-    from nrdf.regions.embedded import Embedded
+    from nrdf.field.encoded_cloud import EncodedCloud
+    from nrdf.io.cloud import PointCloud
     from nrdf.scans.target import AlignedScan
 
 
@@ -90,7 +90,7 @@ def transfer(
     import math
 
     from nrdf.errors import CloudError, LimitError, NothingFoundError
-    from nrdf.output import check_inputs, output_folder
+    from nrdf.io.output import check_inputs, output_folder
     from nrdf.process.limits import Limits
 
     limits = Limits(
@@ -108,11 +108,11 @@ def transfer(
         raise CloudError("--sensor and --skip are for scans: give --up")
     with output_folder(out, overwrite, [knowledge, target, *region, model]) as folder:
         import nrdf
-        from nrdf.process.job_folder import write_transfer
-        from nrdf.process.lesson import files_of, read_lesson, unit_and_doubts
-        from nrdf.process.transfer import MIN_CONFIDENCE, Teacher
+        from nrdf.process.bound_knowledge import files_of, read_bound_knowledge, unit_and_doubts
+        from nrdf.process.transfer import MIN_CONFIDENCE, ProcessTransfer
+        from nrdf.reports.job_folder import write_transfer
 
-        lesson = read_lesson(knowledge)
+        lesson = read_bound_knowledge(knowledge)
         check_inputs(out, files_of(lesson.knowledge, knowledge.parent))
         category = lesson.knowledge.category
         loaded = nrdf.load_model(model or category, device)
@@ -127,7 +127,7 @@ def transfer(
             known, guessed = _scan_unit(scan, target)
             doubts = [*guessed, *scan.doubts]
         with errors.status("reference"):
-            teacher = Teacher(lesson, loaded)
+            teacher = ProcessTransfer(lesson, loaded)
         marked = _marked(region, known)
         with errors.status("regions and tool paths"):
             least = MIN_CONFIDENCE if min_confidence is None else min_confidence
@@ -157,8 +157,8 @@ def transfer(
         raise LimitError("\n".join(lines))
 
 
-def _of_scan(scan: AlignedScan, unit: str) -> tuple[Embedded, None, PointCloud]:
-    """A scan as `Teacher.transfer` takes it: embedded in metres, and all of its points."""
+def _of_scan(scan: AlignedScan, unit: str) -> tuple[EncodedCloud, None, PointCloud]:
+    """A scan as `ProcessTransfer.transfer` takes it: embedded in metres, and all of its points."""
     return scan.embed_in_metres(unit), None, scan.unthinned_in_metres(unit)
 
 
@@ -180,7 +180,7 @@ def _indented(lines: Iterable[str]) -> list[str]:
 
 def show_transfer(report: dict[str, Any]) -> None:
     """A table of a transfer's tool paths, and its warnings."""
-    from nrdf.process.report import SHORT_FIGURES, short_figures
+    from nrdf.reports.transfer_report import SHORT_FIGURES, short_figures
 
     none = ["–"] * len(SHORT_FIGURES)
     shown = table("", "region", "process", "sure", *SHORT_FIGURES, texts=2)
@@ -198,8 +198,8 @@ def show_transfer(report: dict[str, Any]) -> None:
 
 def _marked(files: tuple[Path, ...], unit: str) -> dict[str, Any]:
     """Regions that a person has marked on the target, points in metres."""
+    from nrdf.geometry.units import METRES
     from nrdf.regions.files import read_regions
-    from nrdf.units import METRES
 
     found = read_regions(files, unit) if files else {}
     return {n: v if v.ndim == 1 else v * METRES[unit] for n, v in found.items()}
@@ -211,7 +211,7 @@ def _scan_unit(scan: AlignedScan, target: Path) -> tuple[str, list[str]]:
     Raises ProcessError unless it is given or only one is plausible.
     """
     from nrdf.errors import ProcessError
-    from nrdf.units import METRES
+    from nrdf.geometry.units import METRES
 
     unit = scan.unit
     if unit.name is None or (unit.origin == "guessed" and unit.doubt):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from nrdf.bounds import Count, Seed
 from nrdf.commands.console import console, progress_bar
+from nrdf.io.bounds import Count, Seed
 
 
 def yaw(

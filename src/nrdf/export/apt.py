@@ -18,7 +18,7 @@ from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare, strokes, tool_numbers
 from nrdf.export.rotation import tool_axes
-from nrdf.process.toolpath import Job, ToolPath
+from nrdf.toolpath.types import Job, ToolPath
 
 _WIDTH = 72
 _CARRIED = (

@@ -20,7 +20,7 @@ from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes, tool_numbers
 from nrdf.export.rotation import rotary_angles_deg, tool_axes
-from nrdf.process.toolpath import Job, ToolPath
+from nrdf.toolpath.types import Job, ToolPath
 
 _CARRIED = (
     "Contact force is not carried: it stands in comments. Nor is the tool's turn about its own "

@@ -9,8 +9,8 @@ from pathlib import Path
 from nrdf.export.names import numbers, plain_text
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.prepare import tool_numbers
-from nrdf.ply import write_atomically
-from nrdf.process.toolpath import Job, Segment, ToolPath
+from nrdf.io.ply import write_atomically
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 TOOL_Z_WORDS = {
     "into": "tool z points into the part, tool x along the travel",

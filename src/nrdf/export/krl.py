@@ -16,7 +16,7 @@ from nrdf.export.names import number, numbers, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes, tool_numbers
 from nrdf.export.rotation import kuka_abc_deg
-from nrdf.process.toolpath import Job, ToolPath
+from nrdf.toolpath.types import Job, ToolPath
 
 _WORDS = (
     "and anin anout b_and b_exor b_not b_or bool brake case ccirc char circ circ_rel confirm const "

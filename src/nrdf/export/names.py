@@ -8,8 +8,8 @@ from collections.abc import Iterable
 
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options
-from nrdf.names import DEVICES
-from nrdf.process.toolpath import Job
+from nrdf.io.names import DEVICES
+from nrdf.toolpath.types import Job
 
 
 def plain_text(text: str) -> str:

@@ -2,7 +2,7 @@
 
 A file is a list of ToolPaths, here one a path of the job; ToolPaths are a list of ToolPath, here
 one a line; a ToolPath is a list of segments, here what is driven without leaving the surface, with
-its approach and departure as Noether's own modifiers add them; a segment is a list of waypoints, x,
+its approach and retract as Noether's own modifiers add them; a segment is a list of waypoints, x,
 y, z, qw, qx, qy, qz (noether_tpp/serialization.h).
 """
 
@@ -22,7 +22,7 @@ from nrdf.export.header import (
 from nrdf.export.names import numbers, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.process.toolpath import Job, Segment
+from nrdf.toolpath.types import Job, Segment
 
 _KEYS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _CARRIED = "Contact force, speed, spindle and dwell are not carried: they stand in comments."
@@ -50,10 +50,10 @@ def write(job: Job, options: Options, folder: Path) -> None:
 def _contacts(segments: list[tuple[int, Segment]]) -> list[list[tuple[int, Segment]]]:
     """The segments of a line, those together between which the tool does not leave the surface."""
     made: list[list[tuple[int, Segment]]] = []
-    before = "departure"
+    before = "retract"
     for item in segments:
         kind = item[1].kind
-        if before == "departure" or kind == "approach" or kind == before:
+        if before == "retract" or kind == "approach" or kind == before:
             made.append([])
         made[-1].append(item)
         before = kind

@@ -33,7 +33,7 @@ class Options:
     program_number: int = 1
     """Number of the program (gcode: O0001)."""
     process_only: bool = False
-    """Leave approach and departure out."""
+    """Leave approach and retract out."""
     blend_mm: float = 1.0
     """How far from a waypoint a robot may round it (urscript, rapid, krl); 0: it stops at each."""
     acceleration_m_s2: float = 0.5

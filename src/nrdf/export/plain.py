@@ -11,7 +11,7 @@ from nrdf.export.header import header, save, tool_z_words
 from nrdf.export.names import program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.process.toolpath import Job, pose_of
+from nrdf.toolpath.types import Job, pose_of
 
 VERSION = 1
 _CARRIED = (

@@ -9,7 +9,7 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.rotation import tool_z_out
-from nrdf.process.toolpath import Job, Segment, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _FARTHEST_M = 100.0
 _SMALLEST_BLEND_M = 1e-4

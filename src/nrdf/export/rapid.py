@@ -16,7 +16,7 @@ from nrdf.export.names import identifier, identifiers, number, numbers, program_
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
 from nrdf.export.rotation import quaternions_wxyz
-from nrdf.process.toolpath import Job, ToolPath
+from nrdf.toolpath.types import Job, ToolPath
 
 _WORDS = (
     "alias and backward case connect const default div do else elseif endfor endfunc endif "

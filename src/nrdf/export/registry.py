@@ -11,7 +11,7 @@ from nrdf.errors import OutputError, ProcessError, unknown_name
 from nrdf.export.options import Options
 
 if TYPE_CHECKING:
-    from nrdf.process.toolpath import Job
+    from nrdf.toolpath.types import Job
 
 FORMATS = {
     "ros2-bag": "nrdf.export.ros2_bag",

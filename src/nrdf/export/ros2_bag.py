@@ -16,8 +16,8 @@ from nrdf.export.names import identifier, plain_text
 from nrdf.export.options import Options
 from nrdf.export.plain import describe
 from nrdf.export.prepare import prepare
-from nrdf.locks import writing
-from nrdf.process.toolpath import Job, Segment
+from nrdf.io.locks import writing
+from nrdf.toolpath.types import Job, Segment
 
 BAG = "bag"
 _TYPES = {"path": "nav_msgs/msg/Path", "poses": "geometry_msgs/msg/PoseArray"}

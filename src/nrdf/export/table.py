@@ -10,8 +10,8 @@ from nrdf.export.header import commented, header, save, tool_z_words
 from nrdf.export.names import plain_text, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.names import spreadsheet_text
-from nrdf.process.toolpath import Job
+from nrdf.io.names import spreadsheet_text
+from nrdf.toolpath.types import Job
 
 COLUMNS = (
     *("path", "region", "process", "tool", "tool_radius_m", "spindle_rad_s"),

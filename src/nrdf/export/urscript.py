@@ -18,7 +18,7 @@ from nrdf.export.names import number, numbers, plain_text, program_name, routine
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
 from nrdf.export.rotation import rotation_vectors
-from nrdf.process.toolpath import Job, ToolPath
+from nrdf.toolpath.types import Job, ToolPath
 
 _WORDS = (
     "and break continue def elif else end false for global halt if in kill local loop movec movej "

@@ -16,8 +16,8 @@ __all__ = ["PRESETS", "Field", "Inverse", "build_field", "field_class"]
 PRESETS: dict[str, str] = {
     "default": "nrdf.field.default:DefaultField",
     "paper": "nrdf.field.paper:PaperField",
-    "ndf": "nrdf.field.ndf:NDFField",
-    "imdc": "nrdf.field.imdc:IMDCField",
+    "ndf": "nrdf_benchmark.presets.ndf:NDFField",
+    "imdc": "nrdf_benchmark.presets.imdc:IMDCField",
 }
 """Preset name to "module:class"; modules are imported when their preset is first built."""
 

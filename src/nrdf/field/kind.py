@@ -19,7 +19,7 @@ from nrdf.errors import ModelError
 from nrdf.field.base import FieldConfig
 from nrdf.field.weights import load_tensors
 from nrdf.field.zoo import KIND, ZOO, find_weights, list_models
-from nrdf.similarity import AXES, LEFT_FOR_RIGHT, about_up, up_axis, upright
+from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, about_up, up_axis, upright
 
 KIND_ZOO = ZOO / KIND
 """Folder of the networks that ship, with an index of its own; a network's name is its category."""

@@ -17,9 +17,9 @@ from torch import Tensor, nn
 from nrdf.errors import ModelError
 from nrdf.field import build_field
 from nrdf.field.base import Field
-from nrdf.files import require_file
-from nrdf.ply import write_atomically
-from nrdf.strict import explain
+from nrdf.io.files import require_file
+from nrdf.io.ply import write_atomically
+from nrdf.io.schema import explain
 
 FORMAT = "nrdf-weights-1"
 LARGEST = 500_000_000

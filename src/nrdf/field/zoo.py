@@ -19,9 +19,9 @@ from pydantic import ConfigDict, TypeAdapter
 from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
 from nrdf.field.weights import load_weights, read_metadata
-from nrdf.files import read_file
-from nrdf.names import file_name_fault
-from nrdf.ply import write_atomically
+from nrdf.io.files import read_file
+from nrdf.io.names import file_name_fault
+from nrdf.io.ply import write_atomically
 
 log = logging.getLogger(__name__)
 

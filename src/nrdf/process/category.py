@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nrdf.errors import ProcessError
-from nrdf.strict import nearest
+from nrdf.io.schema import nearest
 
 
 def known_categories() -> list[str]:

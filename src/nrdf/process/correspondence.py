@@ -8,16 +8,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from nrdf.cloud import PointCloud
-from nrdf.geometry import thin
-from nrdf.process.surface import SAME_SIDE, Surface, unit
+from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.geometry.points import thin
+from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.io.cloud import PointCloud
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
-from nrdf.regions.embedded import Embedded
 from nrdf.regions.match import Mapped
 from nrdf.regions.model import Model
-from nrdf.regions.taught import Taught
+from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
-from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.surface.surface import SAME_SIDE, Surface, unit
 
 FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
 """A waypoint has a counterpart where C's place is at most so far off the target's points, in all,
@@ -40,14 +40,16 @@ _SETTLING = RegistrationSettings(
 class TaughtSurface:
     """A reference as waypoints are carried from it: as the field sees it, and as a surface."""
 
-    def __init__(self, taught: Taught) -> None:
+    def __init__(self, taught: EncodedReference) -> None:
         self.taught = taught
         self.surface = surface_of(taught.reference)
 
     @cached_property
-    def mirrored(self) -> Taught:
+    def mirrored(self) -> EncodedReference:
         """The reference's mirror image, left for right; its own frame is the canonical one."""
-        return Taught(self.taught.model, _mirrored(self.taught.model, self.taught.reference))
+        return EncodedReference(
+            self.taught.model, _mirrored(self.taught.model, self.taught.reference)
+        )
 
     @cached_property
     def anchors(self) -> np.ndarray:
@@ -78,14 +80,14 @@ class Correspondence:
     that edges come to lie on edges.
     """
 
-    def __init__(self, reference: TaughtSurface, embedded: Embedded) -> None:
+    def __init__(self, reference: TaughtSurface, embedded: EncodedCloud) -> None:
         self.reference, self.embedded = reference, embedded
         self.target = surface_of(embedded)
         features = oriented_features(embedded.points, embedded.normals, NORMAL_WEIGHT)
         self._tree = cKDTree(features)
 
     @cached_property
-    def _mirrored(self) -> Embedded:
+    def _mirrored(self) -> EncodedCloud:
         return _mirrored(self.reference.taught.model, self.embedded)
 
     def _mapped(self, points: np.ndarray, normals: np.ndarray) -> Mapped:
@@ -185,12 +187,12 @@ class Correspondence:
         return unit(affine @ unit(np.asarray(direction, float)))
 
 
-def surface_of(embedded: Embedded) -> Surface:
+def surface_of(embedded: EncodedCloud) -> Surface:
     """The surface of a cloud in metres, of the points that the field works on."""
     return Surface(embedded.original(embedded.points), embedded.original_normals(embedded.normals))
 
 
-def _mirrored(model: Model, embedded: Embedded) -> Embedded:
+def _mirrored(model: Model, embedded: EncodedCloud) -> EncodedCloud:
     """The mirror image of what the field works on, left for right, in the canonical frame."""
     image = PointCloud(LEFT_FOR_RIGHT * embedded.points, LEFT_FOR_RIGHT * embedded.normals)
     return model.embed(image, Similarity(np.eye(3), np.zeros(3), 1.0))

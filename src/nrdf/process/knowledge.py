@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from nrdf.names import same_file
+from nrdf.io.names import same_file
 from nrdf.process.quantities import (
     Angle,
     Direction,

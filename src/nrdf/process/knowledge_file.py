@@ -10,12 +10,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from nrdf.errors import ProcessError
-from nrdf.files import read_file
-from nrdf.plain_data import read_json, read_yaml
-from nrdf.ply import write_atomically
+from nrdf.io.files import read_file
+from nrdf.io.plain_data import read_json, read_yaml
+from nrdf.io.ply import write_atomically
+from nrdf.io.schema import Location, explain
 from nrdf.process.knowledge import VERSION, Knowledge
 from nrdf.process.knowledge_text import to_yaml
-from nrdf.strict import Location, explain
 
 _LARGEST_FILE = 1 << 27
 _MOST_FAULTS = 12

@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from nrdf.plain_data import to_yaml_line
+from nrdf.geometry.units import OTHER_UNITS, in_words
+from nrdf.io.plain_data import to_yaml_line
 from nrdf.process.knowledge import Knowledge
-from nrdf.units import OTHER_UNITS, in_words
 
 HEADER = """\
 # Process knowledge for nrdf: what is done on which region, taught on one object.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from nrdf.bounds import FROM_ZERO, SHARE
-from nrdf.process.coverage import Measures
-from nrdf.process.transfer import FoundRegion, Transferred
+from nrdf.geometry.units import in_words
+from nrdf.io.bounds import FROM_ZERO, SHARE
+from nrdf.process.transfer import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
-from nrdf.units import in_words
+from nrdf.toolpath.metrics import Measures
 
 DOUBTFUL = 0.4
 """Confidence below which a region that was found should be looked at."""
@@ -16,7 +16,7 @@ SURE = 0.9
 """Confidence from which a region is absent beyond doubt."""
 
 
-def doubts_of(transferred: Transferred) -> list[str]:
+def doubts_of(transferred: TransferResult) -> list[str]:
     """What is doubtful about a transfer: the object (pose, unit, kind), then its regions.
 
     A region is in doubt where it was found with little confidence, and where it was skipped and is
@@ -66,7 +66,7 @@ class Limits:
             if value is not None:
                 (SHARE if name == "min_coverage" else FROM_ZERO).check(name, value)
 
-    def broken(self, transferred: Transferred) -> list[str]:
+    def broken(self, transferred: TransferResult) -> list[str]:
         """A line for each limit that is not met: by which region and process, and by how much."""
         lines = []
         if transferred.kind is not None and not self.any_kind:

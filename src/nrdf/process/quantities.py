@@ -11,8 +11,8 @@ from pydantic import AfterValidator, ConfigDict, Field, GetJsonSchemaHandler, mo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from nrdf.strict import Strict
-from nrdf.units import in_words, other_names, to_si
+from nrdf.geometry.units import in_words, other_names, to_si
+from nrdf.io.schema import Strict
 
 _BOUNDS = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
 

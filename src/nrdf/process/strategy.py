@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.process.knowledge import Process
-from nrdf.process.plan import Strategy
-from nrdf.process.toolpath import Segment, ToolPath
+from nrdf.toolpath.planner import Strategy
+from nrdf.toolpath.types import Segment, ToolPath
 
 
 def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strategy:

@@ -1,6 +1,7 @@
 """Process knowledge transferred to a new object: regions found, tool paths planned or carried.
 
-A `Teacher` is knowledge on its reference, embedded once; `transfer` takes any number of targets.
+A `ProcessTransfer` is knowledge on its reference, embedded once; `transfer` takes any number of
+targets.
 
     teacher = nrdf.teach("chair.yaml")
     job = teacher.transfer(nrdf.read_cloud("new.ply"))
@@ -22,28 +23,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from nrdf.bounds import SHARE
-from nrdf.cloud import PointCloud, in_metres
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
-from nrdf.inputs import as_cloud
-from nrdf.output import output_folder
-from nrdf.process.carry import carry
+from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.geometry.similarity import Similarity
+from nrdf.geometry.units import in_words
+from nrdf.io.bounds import SHARE
+from nrdf.io.cloud import PointCloud, in_metres
+from nrdf.io.inputs import as_cloud
+from nrdf.io.output import output_folder
+from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_doubts
 from nrdf.process.correspondence import Correspondence, TaughtSurface
-from nrdf.process.coverage import Measures, measure
-from nrdf.process.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.process.knowledge import Line, Process, Transfer
-from nrdf.process.lesson import Lesson, overlaps, unit_and_doubts
-from nrdf.process.plan import drive, plan
 from nrdf.process.strategy import strategy_of, tool_path
-from nrdf.process.taught import TaughtLine, taught_lines
-from nrdf.process.toolpath import Segment, ToolPath
-from nrdf.regions.embedded import Embedded
+from nrdf.process.taught_paths import TaughtLine, taught_lines
+from nrdf.process.warp import carry
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind import KindCheck
-from nrdf.similarity import Similarity
-from nrdf.units import in_words
+from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
+from nrdf.toolpath.metrics import Measures, measure
+from nrdf.toolpath.planner import drive, plan
+from nrdf.toolpath.types import Segment, ToolPath
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +64,7 @@ class FoundRegion:
 
 
 @dataclass(frozen=True)
-class TransferredPath:
+class PathResult:
     """One process on one region of the target.
 
     number: which of the region's processes, from 0. process: as it is there (its direction, or its
@@ -82,7 +83,7 @@ class TransferredPath:
 
 
 @dataclass(frozen=True)
-class Transferred:
+class TransferResult:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
     target: with normals, estimated where its file had none. seconds: time by phase. pose: from
@@ -91,10 +92,10 @@ class Transferred:
     `nrdf.process.limits.doubts_of`.
     """
 
-    lesson: Lesson
+    lesson: BoundKnowledge
     target: PointCloud
     regions: dict[str, FoundRegion]
-    paths: tuple[TransferredPath, ...]
+    paths: tuple[PathResult, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     pose: Similarity | None = None
@@ -106,20 +107,20 @@ class Transferred:
 
         Raises OutputError if it is not empty, without `overwrite`, or cannot be written.
         """
-        from nrdf.process.job_folder import write_transfer
         from nrdf.process.limits import Limits
+        from nrdf.reports.job_folder import write_transfer
 
         with output_folder(path, overwrite) as folder:
             write_transfer(folder, self, Limits(), title, {})
 
 
-class Teacher:
+class ProcessTransfer:
     """Knowledge on its reference, as a model sees it.
 
     Raises ModelError for a model of another category.
     """
 
-    def __init__(self, lesson: Lesson, model: Model) -> None:
+    def __init__(self, lesson: BoundKnowledge, model: Model) -> None:
         category = lesson.knowledge.category
         if model.category and model.category != category:
             raise ModelError(
@@ -142,7 +143,7 @@ class Teacher:
         doubts: Sequence[str] | None = None,
         whole: PointCloud | None = None,
         kind: KindCheck | None = None,
-    ) -> Transferred:
+    ) -> TransferResult:
         """Find the regions on a target, and bring every process there.
 
         target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in the
@@ -163,7 +164,7 @@ class Teacher:
         SHARE.check("min_confidence", min_confidence)
         start = time.perf_counter()
         doubted: Sequence[str] = ()
-        if isinstance(target, Embedded):
+        if isinstance(target, EncodedCloud):
             embedded = self.taught.facing(self.lesson.regions, target)
         else:
             target = as_cloud(target, "the target")
@@ -205,7 +206,9 @@ class Teacher:
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
         made, pose, doubtful = tuple(paths), embedded.pose, tuple(doubts)
-        return Transferred(self.lesson, cloud, found, made, warnings, seconds, pose, doubtful, kind)
+        return TransferResult(
+            self.lesson, cloud, found, made, warnings, seconds, pose, doubtful, kind
+        )
 
     def _marked(
         self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
@@ -269,8 +272,8 @@ class Teacher:
         found: FoundRegion,
         way: Correspondence,
         given: GivenSurface,
-    ) -> TransferredPath:
-        made = TransferredPath(region, number, process, process.way)
+    ) -> PathResult:
+        made = PathResult(region, number, process, process.way)
         if found.missing:
             return replace(made, reason=found.missing)
         inside = working(way.embedded, found.match.indices)
@@ -324,7 +327,7 @@ def longest_step(positions: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max(initial=0.0))
 
 
-def with_normals(embedded: Embedded) -> PointCloud:
+def with_normals(embedded: EncodedCloud) -> PointCloud:
     """The whole cloud with the normals that the field works with."""
     if embedded.cloud.normals is not None:
         return embedded.cloud
@@ -332,7 +335,7 @@ def with_normals(embedded: Embedded) -> PointCloud:
     return replace(embedded.cloud, normals=normals[embedded.nearest_working])
 
 
-def working(embedded: Embedded, indices: np.ndarray) -> np.ndarray:
+def working(embedded: EncodedCloud, indices: np.ndarray) -> np.ndarray:
     """Indices of a cloud's points as indices of the points that the field works on."""
     inside = np.zeros(len(embedded.cloud), bool)
     inside[indices] = True

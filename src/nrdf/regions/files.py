@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from nrdf.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.errors import RegionError
-from nrdf.files import open_file
-from nrdf.formats.arrays import array_head, open_arrays
-from nrdf.names import same_file
-from nrdf.picture import region_colours
+from nrdf.geometry.units import METRES
+from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
+from nrdf.io.files import open_file
+from nrdf.io.formats.arrays import array_head, open_arrays
+from nrdf.io.names import same_file
 from nrdf.regions.match import Match
 from nrdf.regions.region import region_name_fault
-from nrdf.units import METRES
+from nrdf.viz.picture import region_colours
 
 
 def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""A trained field that embeds clouds, ready to be taught references (`nrdf.regions.taught`)."""
+"""A trained field that embeds clouds, ready to be taught references (`nrdf.regions.reference`)."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import torch
 
-from nrdf.cloud import check_cloud
 from nrdf.field.base import Field
+from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.field.kind import KindNetwork, find_kind
-from nrdf.geometry import canonical_transform, estimate_normals, thin
-from nrdf.inputs import as_cloud
-from nrdf.regions.embedded import Embedded, encoder_subset
-from nrdf.regions.taught import Taught
-from nrdf.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.geometry.points import canonical_transform, estimate_normals, thin
+from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.io.cloud import check_cloud
+from nrdf.io.inputs import as_cloud
+from nrdf.regions.reference import EncodedReference
 
 WORKING_POINTS = 16384
 """A denser cloud is thinned to this many points; results are carried back to all of its points."""
@@ -56,7 +56,9 @@ class Model:
     def __repr__(self) -> str:
         return f"Model(category={self.category!r}, preset={self.preset!r}, device={self.device})"
 
-    def embed(self, cloud: Any, pose: Similarity | None = None, mirrored: bool = False) -> Embedded:
+    def embed(
+        self, cloud: Any, pose: Similarity | None = None, mirrored: bool = False
+    ) -> EncodedCloud:
         """Thin, orient, normalise and embed a cloud in the category's canonical frame.
 
         cloud: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh.
@@ -92,14 +94,14 @@ class Model:
         with torch.inference_mode():
             z = self.field.embed(self.tensor(seen[chosen])[None], self.tensor(lines[chosen])[None])
         seconds["embed"] = time.perf_counter() - start
-        return Embedded(cloud, working, points, normals, pose, z, seconds)
+        return EncodedCloud(cloud, working, points, normals, pose, z, seconds)
 
-    def set_reference(self, reference: Any) -> Taught:
+    def set_reference(self, reference: Any) -> EncodedReference:
         """Embed a reference and describe its surface once, for any number of targets.
 
         reference: what `nrdf.as_cloud` takes. Raises CloudError as `embed` does.
         """
-        return Taught(self, self.embed(as_cloud(reference, "the reference")))
+        return EncodedReference(self, self.embed(as_cloud(reference, "the reference")))
 
     def tensor(self, values: np.ndarray) -> torch.Tensor:
         """Values of any shape on the model's device, in single precision."""

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from nrdf.cloud import PointCloud
 from nrdf.errors import RegionError
-from nrdf.names import file_name_fault
+from nrdf.io.cloud import PointCloud
+from nrdf.io.names import file_name_fault
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""

@@ -1,8 +1,8 @@
 """Bringing a scan into its category's frame: yaw, scale and centre, and what else it might be.
 
-Yaws over the full circle are judged by the field (`nrdf.scans.judge`) and by a network that tells
-which way an object faces (`nrdf.field.yaw`); the best are refined by the object's own mirror plane
-(`nrdf.scans.mirror`) and judged again, front and back exchanged too.
+Yaws over the full circle are judged by the field (`nrdf.scans.pose_scorer`) and by a network that
+tells which way an object faces (`nrdf.field.yaw`); the best are refined by the object's own mirror
+plane (`nrdf.scans.mirror`) and judged again, front and back exchanged too.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from nrdf.cloud import PointCloud, check_cloud
 from nrdf.field.yaw import at_yaws
-from nrdf.geometry import canonical_transform, estimate_normals, thin
+from nrdf.geometry.points import canonical_transform, estimate_normals, thin
+from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright
+from nrdf.io.cloud import PointCloud, check_cloud
 from nrdf.regions.model import MINIMUM_POINTS
-from nrdf.scans.judge import Judge, sparse_subset
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
-from nrdf.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright
+from nrdf.scans.pose_scorer import PoseScorer, sparse_subset
 
 WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that are judged by
@@ -122,7 +122,7 @@ class _Hypothesis:
         return _Hypothesis(self.up, self.yaw + np.pi, plane)
 
 
-def align_scan(judge: Judge, scan: PointCloud, up: np.ndarray | None = None) -> Alignment:
+def align_scan(judge: PoseScorer, scan: PointCloud, up: np.ndarray | None = None) -> Alignment:
     """Poses in which `scan`, a cleaned one of one object, is an object of the judge's category.
 
     up: (3,) unit, in the scan's frame; the six axes are tried unless given. Raises CloudError for a
@@ -194,7 +194,7 @@ def _posed(
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
 
 
-def _facing(judge: Judge, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
+def _facing(judge: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
     """Log probabilities (ups, bins) of the yaws about each up; all alike without a network."""
     if judge.yaw is None:
         return np.zeros((len(ups), _YAWS))

@@ -10,9 +10,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
-from nrdf.cloud import PointCloud, check_coordinates
 from nrdf.errors import CloudError, unknown_name
-from nrdf.geometry import bounding_box, thin
+from nrdf.geometry.points import bounding_box, thin
+from nrdf.io.cloud import PointCloud, check_coordinates
 from nrdf.scans.floor import Plane, find_floor
 from nrdf.scans.objects import separate_objects
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nrdf.geometry import bounding_box, thin
+from nrdf.geometry.points import bounding_box, thin
 
 _SAMPLE = 3000  # points that hypotheses are tested on
 _HYPOTHESES = 400

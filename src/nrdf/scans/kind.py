@@ -1,8 +1,8 @@
 """Is this the kind of object, upright, facing forward? Asked once, before any region is looked for.
 
 A network of the category tells (`nrdf.field.kind`). For a category without one it is asked how
-well the field explains the target by what is known of the category (`nrdf.scans.judge`), which says
-less.
+well the field explains the target by what is known of the category (`nrdf.scans.pose_scorer`),
+which says less.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
 from nrdf.field.kind import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
+from nrdf.geometry.similarity import AXES, up_axis
+from nrdf.io.cloud import PointCloud
 from nrdf.scans.objects import count_objects
-from nrdf.similarity import AXES, up_axis
 
 if TYPE_CHECKING:
-    from nrdf.regions.embedded import Embedded
+    from nrdf.field.encoded_cloud import EncodedCloud
     from nrdf.regions.model import Model
-    from nrdf.scans.judge import Judge
+    from nrdf.scans.pose_scorer import PoseScorer
 
 LEAST = 0.3
 """Probability that an object stands upright and faces forward, below which it is doubted."""
 FOREIGN, FOREIGN_TO_ONE = 0.5, 0.55
-"""Cost above the usual one (`nrdf.scans.judge`) from which, without a network, it is doubted; the
-second where one object is all that is known."""
+"""Cost above the usual one (`nrdf.scans.pose_scorer`) from which, without a network, it is doubted;
+the second where one object is all that is known."""
 STRANGEST, STRANGEST_TO_ONE = 1.65, 3.0
 """Standard deviations of its proportions from the known objects', likewise."""
 _COUNTED = 2048  # points in which objects are counted
@@ -66,7 +66,7 @@ class KindCheck:
         }
 
 
-def check_kind(model: Model, target: Embedded, judge: Callable[[], Judge]) -> KindCheck:
+def check_kind(model: Model, target: EncodedCloud, judge: Callable[[], PoseScorer]) -> KindCheck:
     """Check a target that is embedded in the pose in which its regions are to be found.
 
     judge: gives what is known of the category; it is asked for only without a network.
@@ -169,7 +169,7 @@ def _letter(direction: np.ndarray) -> str:
     return _axis(direction).lstrip("+").lower()
 
 
-def by_judge(judge: Judge, cost: float, points: np.ndarray) -> KindCheck:
+def by_judge(judge: PoseScorer, cost: float, points: np.ndarray) -> KindCheck:
     """What the field makes of canonical points (n, 3), by a few known objects of the category.
 
     cost: at which it explains them.

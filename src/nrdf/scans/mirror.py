@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry import thin
+from nrdf.geometry.points import thin
 
 _ITERATIONS = 10
 _POINTS = 700  # that are reflected

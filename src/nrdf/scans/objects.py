@@ -7,8 +7,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from nrdf.cloud import PointCloud
-from nrdf.geometry import bounding_box, one_per_cell, thin
+from nrdf.geometry.points import bounding_box, one_per_cell, thin
+from nrdf.io.cloud import PointCloud
 
 _POINTS = 8192
 _NEIGHBOURS = 8

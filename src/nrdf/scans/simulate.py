@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from nrdf.cloud import PointCloud
 from nrdf.errors import DataError
-from nrdf.geometry import canonical_transform
-from nrdf.mesh import check_mesh
-from nrdf.similarity import Similarity
+from nrdf.geometry.mesh import check_mesh
+from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.similarity import Similarity
+from nrdf.io.cloud import PointCloud
 
 _FLOOR_SIZE = 1.5  # half the side of the floor that is seen, in longest sides of the object
 

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.cloud import PointCloud, in_metres
-from nrdf.geometry import thin
-from nrdf.inputs import as_cloud
-from nrdf.regions.embedded import Embedded
+from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.geometry.points import thin
+from nrdf.geometry.similarity import Similarity, up_axis
+from nrdf.geometry.units import METRES, Unit, find_unit
+from nrdf.io.cloud import PointCloud, in_metres
+from nrdf.io.inputs import as_cloud
 from nrdf.regions.match import Match
 from nrdf.regions.model import WORKING_POINTS, Model
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan, unthinned
-from nrdf.scans.judge import Judge
 from nrdf.scans.kind import KindCheck, by_judge, by_network
-from nrdf.similarity import Similarity, up_axis
-from nrdf.units import METRES, Unit, find_unit
+from nrdf.scans.pose_scorer import PoseScorer
 
 _ONE_SIDED = (0.5, 0.9)
 """Symmetry between which the field is shown the mirror image too: the plane is trusted, and what
@@ -31,7 +31,7 @@ one of its sides shows the other one lacks."""
 class AlignedScan:
     """scan: as it was read; cleaned: the object in it; alignment: its poses; unit: of the scan."""
 
-    judge: Judge
+    judge: PoseScorer
     scan: PointCloud
     cleaned: Cleaned
     alignment: Alignment
@@ -42,15 +42,15 @@ class AlignedScan:
         """The likeliest pose: from canonical coordinates to the scan's."""
         return self.alignment.best.pose
 
-    def embed(self) -> Embedded:
+    def embed(self) -> EncodedCloud:
         """The object as the model's field sees it, in the likeliest pose.
 
-        Sheets whose side nothing tells stand for both (`Embedded.two_sided`).
+        Sheets whose side nothing tells stand for both (`EncodedCloud.two_sided`).
         """
         seen = self.judge.model.embed(self.cleaned.cloud, self.pose, self._is_one_sided)
         return seen.two_sided()
 
-    def embed_in_metres(self, unit: str) -> Embedded:
+    def embed_in_metres(self, unit: str) -> EncodedCloud:
         """As `embed`, of the object in metres, its scan being in `unit`."""
         pose = self.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
         cloud = in_metres(self.cleaned.cloud, unit)
@@ -119,7 +119,7 @@ def align(
     up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
     stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
     leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
-    the category's family. For many scans, make one `Judge` and use `bring_in`.
+    the category's family. For many scans, make one `PoseScorer` and use `bring_in`.
 
     Raises CloudError for a direction or step that is not known and where no object is left,
     ModelError for a category without a family and no examples.
@@ -127,11 +127,11 @@ def align(
     direction = None if up == "auto" else up_axis(up)
     scan = as_cloud(scan, "the scan")
     known = [as_cloud(example, "an example") for example in examples]
-    return bring_in(Judge(model, known), scan, direction, sensors, unit, skip)
+    return bring_in(PoseScorer(model, known), scan, direction, sensors, unit, skip)
 
 
 def bring_in(
-    judge: Judge,
+    judge: PoseScorer,
     scan: PointCloud,
     up: np.ndarray | None = None,
     sensors: np.ndarray | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nrdf.winding import mesh_winding_numbers
+from nrdf.geometry.winding import mesh_winding_numbers
 
 PADDING = 0.1
 """Share of the longest side by which the box of uniform queries is larger (Mescheder 2019)."""

@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import CloudError, DataError, NrdfError, OutputError
-from nrdf.geometry import canonical_transform
-from nrdf.mesh import load_mesh, outer_skin
+from nrdf.geometry.mesh import load_mesh, outer_skin
+from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.winding import mesh_winding_numbers
 from nrdf.shapes.dataset import (
     INDEX,
     SPLITS,
@@ -27,7 +28,6 @@ from nrdf.shapes.dataset import (
 )
 from nrdf.shapes.occupancy import occupancy_queries
 from nrdf.shapes.pool import each
-from nrdf.winding import mesh_winding_numbers
 
 ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
 LEAST_ENCLOSED = 0.5  # share of the skin that must have an inside behind it

@@ -12,18 +12,18 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.bench import Bench
+from nrdf.studio.arm_simulation import Trial
 from nrdf.studio.colours import COLOURINGS, likeness_colours
 from nrdf.studio.computing import Computing, Described, SeparateComputing
-from nrdf.studio.desk import Desk
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.studio.editor import Desk
 from nrdf.studio.mouse import Mouse
-from nrdf.studio.panel import Activity, Panel
+from nrdf.studio.panels.panel import Activity, Panel
+from nrdf.studio.result_cache import Bench
+from nrdf.studio.scene_view import Figure, Stage
 from nrdf.studio.session import Session
-from nrdf.studio.stage import Figure, Stage
 from nrdf.studio.teaching import ORIGIN
-from nrdf.studio.trial import Trial
 from nrdf.studio.uploads import check_upload, shown_name
 from nrdf.studio.worker import Progress, Worker
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from nrdf.cloud import PointCloud
+    from nrdf.io.cloud import PointCloud
 
 log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nrdf.picture import BASE_COLOUR, PALETTE
+from nrdf.viz.picture import BASE_COLOUR, PALETTE
 
 COLOURINGS = ("regions", "confidence", "likeness")
 """What the colours of points may show."""

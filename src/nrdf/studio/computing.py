@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
 from nrdf.errors import NrdfError, ProcessError
-from nrdf.process.knowledge_check import Checked, check_process
-from nrdf.process.transfer import Teacher, Transferred, touched
+from nrdf.io.cloud import PointCloud
+from nrdf.process.check import Checked, check_process
+from nrdf.process.transfer import ProcessTransfer, TransferResult, touched
 from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
-from nrdf.studio.body import Body
 from nrdf.studio.document import Document, Loaded, Painted
+from nrdf.studio.paintable_cloud import Body
 from nrdf.studio.separate import Separate, answer, progress_of
 from nrdf.studio.teaching import lesson_of, process_of
 from nrdf.studio.uploads import read_upload
 from nrdf.studio.worker import Progress
 
 if TYPE_CHECKING:
-    from nrdf.regions.embedded import Embedded
+    from nrdf.field.encoded_cloud import EncodedCloud
     from nrdf.regions.model import Model
 
 _NOT_SENT = PointCloud(np.zeros((0, 3)))
@@ -61,7 +61,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class Described:
-    """What the descriptors of several objects say, by `nrdf.regions.taught.Taught.described`.
+    """What the descriptors of several objects say, by
+    `nrdf.regions.reference.EncodedReference.described`.
 
     objects: (n, 6) of the points that are shown, by object. reference: (k, 6) of the reference's
     own points; nearest: (m,) which of them stands for each of its cloud's points.
@@ -89,9 +90,9 @@ class Computing:
         self._models: dict[str, Model] = {}
         self._clouds: dict[str, PointCloud] = {}
         self._bodies: dict[str, Body] = {}
-        self._embedded: dict[tuple[str, str], Embedded] = {}
+        self._embedded: dict[tuple[str, str], EncodedCloud] = {}
         self._said: dict[tuple[str, str, str], np.ndarray] = {}
-        self._teacher: tuple[int, Teacher] | None = None
+        self._teacher: tuple[int, ProcessTransfer] | None = None
 
     def ask(self, name: str, *args: Any, progress: Progress) -> Any:
         """One of the methods below, by its name."""
@@ -139,11 +140,11 @@ class Computing:
         progress(0, 1)
         if self._teacher is None or self._teacher[0] != lesson:
             model = self._model(document.category)
-            self._teacher = lesson, Teacher(lesson_of(clouds, document), model)
+            self._teacher = lesson, ProcessTransfer(lesson_of(clouds, document), model)
 
     def transfer(
         self, target: str, marked: Mapping[str, np.ndarray], progress: Progress
-    ) -> Transferred:
+    ) -> TransferResult:
         """Bring what was taught last to the object of a file; marked: regions painted on it."""
         progress(0, 1)
         teacher = self._taught
@@ -164,7 +165,7 @@ class Computing:
         return Described(said, own, taught.reference.nearest_working)
 
     @property
-    def _taught(self) -> Teacher:
+    def _taught(self) -> ProcessTransfer:
         assert self._teacher is not None, "`teach` comes first"
         return self._teacher[1]
 
@@ -178,7 +179,7 @@ class Computing:
             self._bodies[file] = Body(self._clouds[file])
         return self._bodies[file]
 
-    def _seen(self, file: str) -> Embedded:
+    def _seen(self, file: str) -> EncodedCloud:
         model = self._taught.model
         if (model.category, file) not in self._embedded:
             self._embedded[model.category, file] = model.embed(self._clouds[file])

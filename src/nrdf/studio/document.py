@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.cloud import PointCloud
+from nrdf.io.cloud import PointCloud
 
 REFERENCE = "reference"
 """The key of the reference; targets have their names."""

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nrdf.process.job_folder import panel_of
-from nrdf.studio.bench import Bench
+from nrdf.reports.job_folder import panel_of
 from nrdf.studio.colours import confidence_colours, painted_colours
-from nrdf.studio.desk import Desk
 from nrdf.studio.document import REFERENCE
+from nrdf.studio.editor import Desk
+from nrdf.studio.result_cache import Bench
 
 _DEEP, _PALE = 0.5, 0.62
 """Shares of a region's colour in the lines on it, and in the region where there are lines."""

@@ -11,7 +11,7 @@ import viser
 from nrdf.errors import NrdfError
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.drawing import found
-from nrdf.studio.stage import Figure
+from nrdf.studio.scene_view import Figure
 from nrdf.studio.view import View, inside
 
 if TYPE_CHECKING:

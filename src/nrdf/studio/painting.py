@@ -9,8 +9,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from nrdf.process.surface import Surface
-from nrdf.similarity import LEFT_FOR_RIGHT
+from nrdf.geometry.similarity import LEFT_FOR_RIGHT
+from nrdf.surface.surface import Surface
 
 _NORMAL_WEIGHT = 6.0
 """How many spacings apart two places count whose normals are at right angles."""

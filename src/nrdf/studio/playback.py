@@ -10,15 +10,15 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from nrdf.robot.cell import COLUMN_M
-from nrdf.robot.engine import mujoco
-from nrdf.robot.figures import report_of
-from nrdf.robot.scene import specification
-from nrdf.robot.timing import STEP_S
-from nrdf.robot.trajectories import rows
+from nrdf.robot.model.cell import COLUMN_M
+from nrdf.robot.model.engine import mujoco
+from nrdf.robot.planning.timing import STEP_S
+from nrdf.robot.report.metrics import report_of
+from nrdf.robot.report.trajectories import rows
+from nrdf.robot.simulation.scene import specification
 
 if TYPE_CHECKING:
-    from nrdf.robot.simulate import DrivenPath, Simulated
+    from nrdf.robot.simulation.simulate import DrivenPath, Simulated
 
 FLOOR = -1  # the body of what does not move
 EVERY_PATH = -1
@@ -44,13 +44,13 @@ class Shape:
 
 @dataclass(frozen=True)
 class Playback:
-    """A job on an arm, in the cell's frame (`nrdf.robot.cell.Placement`), about every 40 ms.
+    """A job on an arm, in the cell's frame (`nrdf.robot.model.cell.Placement`), about every 40 ms.
 
     times: (t,), s, and what is at each: path (t,), the number of the tool path; doing: (t,) as
-    `nrdf.robot.program.Kind`; line (t,), -1 where none is driven; force_n (t,); turn_rad (t,), of
-    the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies. T_cell_object:
-    (4, 4), of the object at turn 0. missed: (k, 3), waypoints that are not reached, in the object's
-    frame, m. report: what report.json says.
+    `nrdf.robot.planning.program.Kind`; line (t,), -1 where none is driven; force_n (t,); turn_rad
+    (t,), of the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies.
+    T_cell_object: (4, 4), of the object at turn 0. missed: (k, 3), waypoints that are not reached,
+    in the object's frame, m. report: what report.json says.
     """
 
     shapes: tuple[Shape, ...]

@@ -14,17 +14,17 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.export.registry import export_job
-from nrdf.names import usable_file_name
-from nrdf.output import output_file, output_folder
-from nrdf.picture import Panel, draw_regions
-from nrdf.process.job_folder import job_of, panel_of, write_transfer
+from nrdf.io.names import usable_file_name
+from nrdf.io.output import output_file, output_folder
+from nrdf.io.swap import MANIFEST
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
-from nrdf.studio.bench import Bench, Result
-from nrdf.studio.desk import Desk
+from nrdf.reports.job_folder import job_of, panel_of, write_transfer
 from nrdf.studio.document import REFERENCE
+from nrdf.studio.editor import Desk
+from nrdf.studio.result_cache import Bench, Result
 from nrdf.studio.teaching import knowledge_of
-from nrdf.swap import MANIFEST
+from nrdf.viz.picture import Panel, draw_regions
 
 SAVED = "saved"
 

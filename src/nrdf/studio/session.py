@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from nrdf.cloud import PointCloud, write_cloud
 from nrdf.errors import OutputError, ProcessError
-from nrdf.locks import remove_parts
+from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.io.locks import remove_parts
 from nrdf.studio.document import Document, Loaded
 from nrdf.studio.session_file import (
     CLOUDS,

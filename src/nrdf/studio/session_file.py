@@ -21,14 +21,14 @@ from pydantic import (
     model_validator,
 )
 
-from nrdf.cloud import check_cloud, read_cloud
 from nrdf.errors import NrdfError, OutputError, ProcessError
-from nrdf.files import read_file
-from nrdf.ply import write_atomically
-from nrdf.process.knowledge_new import KINDS
+from nrdf.io.cloud import check_cloud, read_cloud
+from nrdf.io.files import read_file
+from nrdf.io.ply import write_atomically
+from nrdf.io.schema import Strict, explain
+from nrdf.process.new_knowledge import KINDS
 from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.regions.region import region_name_fault
-from nrdf.strict import Strict, explain
 from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
 
 FILE = "session.json"

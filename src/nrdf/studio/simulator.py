@@ -71,8 +71,8 @@ def _serve(pipe: Connection, job: Path, robot: Path | None, tool_frame: str | No
 def _simulate(
     pipe: Connection, job: Path, robot: Path | None, tool_frame: str | None, kept: list[Any]
 ) -> Playback:
-    from nrdf.robot.arm import load_arm
-    from nrdf.robot.simulate import read_work, simulate
+    from nrdf.robot.model.arm import load_arm
+    from nrdf.robot.simulation.simulate import read_work, simulate
     from nrdf.studio.playback import playback_of
 
     work = read_work(job)
@@ -92,8 +92,8 @@ def _simulate(
 def _write(
     pipe: Connection, simulated: Any, place: Path, title: str, origin: Mapping[str, Any]
 ) -> dict[str, Any]:
-    from nrdf.output import output_folder
-    from nrdf.robot.result import write_simulation
+    from nrdf.io.output import output_folder
+    from nrdf.robot.report.folder import write_simulation
 
     with output_folder(place, overwrite=True) as folder:
         return write_simulation(folder, simulated, title, origin, progress=progress_of(pipe))

@@ -9,12 +9,12 @@ from typing import Any, get_args
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.units import OTHER_UNITS, to_si
+from nrdf.process.bound_knowledge import BoundKnowledge, bind, checksum, overlaps
 from nrdf.process.knowledge import Knowledge, Process, Trajectory
 from nrdf.process.knowledge_file import validated
-from nrdf.process.knowledge_new import DEFAULTS
-from nrdf.process.lesson import Lesson, bind, checksum, overlaps
+from nrdf.process.new_knowledge import DEFAULTS
 from nrdf.studio.document import Document, Painted
-from nrdf.units import OTHER_UNITS, to_si
 
 PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")
 NUMBERS = (
@@ -89,9 +89,9 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
     )
 
 
-def lesson_of(clouds: Path, document: Document) -> Lesson:
+def lesson_of(clouds: Path, document: Document) -> BoundKnowledge:
     """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
-    as `knowledge_of` and `nrdf.process.lesson.bind` do."""
+    as `knowledge_of` and `nrdf.process.bound_knowledge.bind` do."""
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
     for line in [] if document.allow_overlap else overlaps(regions):
         raise ProcessError(
@@ -118,7 +118,9 @@ def _content(
     }
 
 
-def painted_of(lesson: Lesson, colours: Mapping[str, tuple[int, int, int]]) -> tuple[Painted, ...]:
+def painted_of(
+    lesson: BoundKnowledge, colours: Mapping[str, tuple[int, int, int]]
+) -> tuple[Painted, ...]:
     """A lesson's regions and steps, to be changed on the page."""
     painted = []
     for region in lesson.knowledge.regions:

@@ -8,10 +8,10 @@ from pathlib import Path, PurePath
 import numpy as np
 
 from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-from nrdf.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.errors import CloudError, NrdfError
-from nrdf.geometry import thin
-from nrdf.process.lesson import known_unit
+from nrdf.geometry.points import thin
+from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
+from nrdf.process.bound_knowledge import known_unit
 from nrdf.regions.model import MINIMUM_POINTS, WORKING_POINTS
 
 LARGEST_UPLOAD = 128 << 20
@@ -28,7 +28,7 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
 
     The name serves for messages, and its ending for telling the format; it is no path. unit: where
     the file does not say it. Raises CloudError for a file that is too large, of another type, or
-    that `nrdf.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
+    that `nrdf.io.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
     """
     ending = check_upload(name, len(content))
     shown = shown_name(name)

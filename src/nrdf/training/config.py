@@ -9,9 +9,9 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from nrdf.errors import ConfigError
-from nrdf.files import read_file
-from nrdf.plain_data import read_yaml
-from nrdf.strict import Strict, explain, nearest
+from nrdf.io.files import read_file
+from nrdf.io.plain_data import read_yaml
+from nrdf.io.schema import Strict, explain, nearest
 
 
 class AugmentConfig(Strict):

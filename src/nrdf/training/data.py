@@ -61,7 +61,7 @@ def seeded(device: torch.device, *keys: int) -> torch.Generator:
     return torch.Generator(device).manual_seed(int(state >> 1))
 
 
-class Bank:
+class ShapeDataset:
     """All shapes of one split, stacked on one device.
 
     Raises DataError when there are no shapes or a shape cannot be stacked, ConfigError when the
@@ -147,7 +147,7 @@ class Bank:
         self.group_normals = torch.cat(columns[1]).to(self.device)
         self.group_weight = torch.cat(columns[2]).to(self.device)
 
-    def with_pools(self, shares: dict[str, float] | None) -> Bank:
+    def with_pools(self, shares: dict[str, float] | None) -> ShapeDataset:
         """The same shapes in other shares; itself where `shares` is None.
 
         Raises ConfigError when the pools leave a shape out.
@@ -158,7 +158,7 @@ class Bank:
         other.pools = find_pools(self.sources, shares)
         return other
 
-    def plain(self) -> dict[str, Bank]:
+    def plain(self) -> dict[str, ShapeDataset]:
         """By pool, the same shapes without deformation or noise; pools of one are left out."""
         config = self.config.model_copy(
             update={"augment": AugmentConfig(), "rolls": 1, "correspondences": 256}
@@ -357,6 +357,7 @@ def _tensor(values: np.ndarray, pick: np.ndarray | None = None) -> Tensor:
 
 def load_bank(
     entries: Sequence[Entry], split: str, config: DataConfig, device: torch.device | str
-) -> Bank:
-    """The shapes of one split (train, val, test) in memory (errors: `read_shape`, `Bank`)."""
-    return Bank((read_shape(e.path) for e in entries if e.split == split), config, device)
+) -> ShapeDataset:
+    """The shapes of one split (train, val, test) in memory (errors: `read_shape`,
+    `ShapeDataset`)."""
+    return ShapeDataset((read_shape(e.path) for e in entries if e.split == split), config, device)

@@ -28,12 +28,12 @@ from nrdf.field.kind import (
     KindConfig,
     KindNetwork,
 )
-from nrdf.geometry import canonical_transform
-from nrdf.mesh import load_mesh, outer_skin
+from nrdf.geometry.mesh import load_mesh, outer_skin
+from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.similarity import about_up, upright
 from nrdf.shapes.boxes import Boxes
 from nrdf.shapes.dataset import INDEX
 from nrdf.shapes.prepare import find_meshes
-from nrdf.similarity import about_up, upright
 from nrdf.training.provenance import list_shapes, provenance
 from nrdf.training.scanned import (
     SURFACE_POINTS,

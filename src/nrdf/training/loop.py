@@ -21,7 +21,7 @@ from nrdf.errors import ConfigError, DataError, TrainingError, unknown_name
 from nrdf.field import build_field
 from nrdf.field.base import Field
 from nrdf.field.weights import save_weights
-from nrdf.locks import claim
+from nrdf.io.locks import claim
 from nrdf.training.checkpoint import (
     Position,
     common_checkpoint,
@@ -34,9 +34,9 @@ from nrdf.training.checkpoint import (
     write_identity,
 )
 from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
-from nrdf.training.data import Bank, Batch, load_bank, seeded
+from nrdf.training.data import Batch, ShapeDataset, load_bank, seeded
 from nrdf.training.distributed import Workers, choose_precision, join_workers
-from nrdf.training.losses import LOSSES, Forward
+from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import validate
@@ -111,10 +111,10 @@ def run_identity(config: TrainConfig, category: str, shapes: Sequence[str]) -> d
 
 def run_stages(
     config: TrainConfig,
-    bank: Bank,
+    bank: ShapeDataset,
     out: Path,
     workers: Workers,
-    validation: Bank | None,
+    validation: ShapeDataset | None,
     begin: Path | None = None,
 ) -> tuple[Field, dict[str, float]]:
     """All stages from wherever the run stands, or from the checkpoint `begin` where it has none;
@@ -227,7 +227,7 @@ class Objective(nn.Module):
         """The sum () with gradient, and every loss () before weighting, without."""
         device = batch.points.device.type
         with torch.autocast(device, self._precision, self._precision != torch.float32):
-            forward = Forward(self.field, batch, generator, self._cloud_points)
+            forward = LossContext(self.field, batch, generator, self._cloud_points)
             terms = {name: LOSSES[name](forward) for name in self._weights}
         total = torch.stack([w * terms[name].float() for name, w in self._weights.items()]).sum()
         return total, {
@@ -236,7 +236,7 @@ class Objective(nn.Module):
         }
 
 
-def stage_steps(stage: Stage, bank: Bank, world: int) -> int:
+def stage_steps(stage: Stage, bank: ShapeDataset, world: int) -> int:
     """How many steps a stage has."""
     if stage.steps is not None:
         return stage.steps

@@ -3,8 +3,8 @@
 Equation numbers are the paper's: (3) is the Chamfer distance and (7) the descriptor distance; the
 others follow from the order in which the paper's third stage lists its losses.
 
-Every loss is a function of a `Forward`: a batch and what the field makes of it, each part computed
-once, when a loss first asks for it.
+Every loss is a function of a `LossContext`: a batch and what the field makes of it, each part
+computed once, when a loss first asks for it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ ROBUST = 0.01
 """Distance (canonical) below which `correspondence` turns from linear to quadratic."""
 
 
-class Forward:
+class LossContext:
     """A batch and what the field makes of it."""
 
     def __init__(
@@ -114,7 +114,7 @@ def robust_distance(points: Tensor, batch: Batch) -> Tensor:
     return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, batch.weight)
 
 
-def roughness(f: Forward, values: Tensor) -> Tensor:
+def roughness(f: LossContext, values: Tensor) -> Tensor:
     """Mean of ‖v(x) − v(y)‖ over 512 random points x of each cloud and their 16 nearest y within
     0.1; values v (b, c, d) at the clouds' points."""
     c = f.cloud_points
@@ -126,34 +126,34 @@ def roughness(f: Forward, values: Tensor) -> Tensor:
     return weighted_mean(distances_to(values, rows, around), (apart < 0.1).float())
 
 
-def occupancy(f: Forward) -> Tensor:
+def occupancy(f: LossContext) -> Tensor:
     """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
     return functional.binary_cross_entropy_with_logits(f.logits, f.batch.occupancy)
 
 
-def self_reconstruction(f: Forward) -> Tensor:
+def self_reconstruction(f: LossContext) -> Tensor:
     """(2): ‖C(z_i, θ(z_i, x)) − x‖², averaged over points x of shape i."""
     return (f.own - f.cloud).square().sum(-1).mean()
 
 
-def chamfer(f: Forward) -> Tensor:
+def chamfer(f: LossContext) -> Tensor:
     """(3): Σ over both directions of the mean of min ‖x − y‖², between x in the cross
     reconstruction C(z_j, θ(z_i, ·)) and y in shape j."""
     return chamfer_distance(f.cross, f.cloud[f.partner])
 
 
-def emd(f: Forward) -> Tensor:
+def emd(f: LossContext) -> Tensor:
     """(4): min over bijections φ of the mean of ‖x − φ(x)‖, from cross reconstruction to shape j;
     the bijection by auction (eps 0.005, 50 rounds)."""
     return earth_movers_distance(f.cross, f.cloud[f.partner])
 
 
-def descriptor_smoothness(f: Forward) -> Tensor:
+def descriptor_smoothness(f: LossContext) -> Tensor:
     """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
     return roughness(f, f.descriptors.float())
 
 
-def normal_consistency(f: Forward) -> Tensor:
+def normal_consistency(f: LossContext) -> Tensor:
     """(6): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
     by local PCA, its sign from the normal that x had on shape i."""
     ours = local_normals(f.cross, towards=f.cloud_normals)
@@ -161,7 +161,7 @@ def normal_consistency(f: Forward) -> Tensor:
     return (1 - (ours * theirs).sum(-1)).mean()
 
 
-def descriptor_distance(f: Forward) -> Tensor:
+def descriptor_distance(f: LossContext) -> Tensor:
     """(7): Chamfer distance between the descriptors of the cross reconstruction, taken on shape j,
     and those of shape i that it was made from.
 
@@ -173,19 +173,19 @@ def descriptor_distance(f: Forward) -> Tensor:
     return (nearest_distance(ours, theirs).mean() + nearest_distance(theirs, ours).mean()) / 2
 
 
-def displacement_smoothness(f: Forward) -> Tensor:
+def displacement_smoothness(f: LossContext) -> Tensor:
     """IMDC's smoothness (Liu & Liu 2020): of the displacements C(z_j, θ(z_i, x)) − x, as (5) has it
     of descriptors."""
     return roughness(f, f.cross - f.cloud)
 
 
-def correspondence(f: Forward) -> Tensor:
+def correspondence(f: LossContext) -> Tensor:
     """Weighted mean of √(d² + ε²) − ε, d from C(z_j, θ(z_i, x)) to the known place of x on
     shape j; ε = 0.01 keeps doubtful correspondences from ruling (not in the paper)."""
     return robust_distance(f.match.points, f.batch)
 
 
-def landing(f: Forward) -> Tensor:
+def landing(f: LossContext) -> Tensor:
     """`correspondence` of where C first landed, before its local look (not in the paper). Zero
     for a field that looks once only."""
     if f.match.first is None:
@@ -193,7 +193,7 @@ def landing(f: Forward) -> Tensor:
     return robust_distance(f.match.first, f.batch)
 
 
-def normal(f: Forward) -> Tensor:
+def normal(f: LossContext) -> Tensor:
     """Weighted mean of 1 − n̂·n, n̂ predicted at the corresponding place, n known there (not in the
     paper). Zero for a field that predicts no normals."""
     if f.match.normals is None:
@@ -202,7 +202,7 @@ def normal(f: Forward) -> Tensor:
     return weighted_mean(1 - cosine, f.batch.weight)
 
 
-def existence(f: Forward) -> Tensor:
+def existence(f: LossContext) -> Tensor:
     """−[e log ê + (1 − e) log(1 − ê)] over the places of which it is known whether the target has
     them at all, e = 1 where it has (not in the paper). Zero for a field that predicts no
     existence."""
@@ -215,7 +215,7 @@ def existence(f: Forward) -> Tensor:
     return weighted_mean(each, f.batch.known.float())
 
 
-def error_scale(f: Forward) -> Tensor:
+def error_scale(f: LossContext) -> Tensor:
     """Weighted mean of d/s + log s, the negative logarithm of a Laplace density of scale s, of the
     distance d (without gradient) that `correspondence` measures; s predicted (not in the paper).
     Zero for a field that predicts no error."""
@@ -226,7 +226,7 @@ def error_scale(f: Forward) -> Tensor:
     return weighted_mean(d * (-log_scale).exp() + log_scale, f.batch.weight)
 
 
-LOSSES: dict[str, Callable[[Forward], Tensor]] = {
+LOSSES: dict[str, Callable[[LossContext], Tensor]] = {
     "occupancy": occupancy,
     "self": self_reconstruction,
     "chamfer": chamfer,

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import WEIGHTS
-from nrdf.locks import claim, writing
+from nrdf.io.locks import claim, writing
 from nrdf.training.checkpoint import (
     METRICS,
     Position,

@@ -7,14 +7,14 @@ from collections import defaultdict
 import torch
 
 from nrdf.field.base import Field
-from nrdf.training.data import Bank
+from nrdf.training.data import ShapeDataset
 
 STEPS = 8
 BATCH = 8
 
 
 @torch.no_grad()
-def validate(field: Field, bank: Bank) -> dict[str, float]:
+def validate(field: Field, bank: ShapeDataset) -> dict[str, float]:
     """Scores on undeformed shapes, the same draw every time.
 
     `val/error`: mean distance between predicted and known corresponding points (canonical
@@ -44,7 +44,7 @@ def validate(field: Field, bank: Bank) -> dict[str, float]:
     return scores
 
 
-def _sums(field: Field, pool: Bank) -> dict[str, float]:
+def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
     """Numerators and denominators of the scores over one pool."""
     sums: dict[str, float] = defaultdict(float)
     size = min(BATCH, max(len(members) for _, _, members in pool.pools))

@@ -1,0 +1,204 @@
+"""Knowledge together with what it was taught on: the reference's cloud and the regions on it."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from nrdf.errors import CloudError, NrdfError, ProcessError
+from nrdf.geometry.units import METRES, USUAL_SIZES, guess_unit
+from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
+from nrdf.io.files import open_file
+from nrdf.process.knowledge import Knowledge, Reference, Region
+from nrdf.process.knowledge_file import listed, read_knowledge
+from nrdf.regions.files import read_region_file
+from nrdf.regions.model import MINIMUM_POINTS
+from nrdf.regions.region import region_indices
+
+log = logging.getLogger(__name__)
+
+COMMON = 0.02
+"""Share of a region's points that another may have as well: borders are cut by hand."""
+_ODD_SIZE = 3.0  # times the usual size at which a unit is doubted
+
+
+@dataclass(frozen=True)
+class BoundKnowledge:
+    """Knowledge on its reference.
+
+    cloud: the reference in metres. regions: name to indices (k,) of its points, in the order of
+    the knowledge's regions.
+    """
+
+    knowledge: Knowledge
+    cloud: PointCloud
+    regions: dict[str, np.ndarray]
+
+
+def read_bound_knowledge(path: str | Path) -> BoundKnowledge:
+    """A knowledge file with its reference and regions.
+
+    Raises ProcessError as `read_knowledge` and `bind` do, and CloudError for a reference that
+    cannot be read.
+    """
+    path = Path(path)
+    return bind(read_knowledge(path), path.parent, str(path))
+
+
+def bind(
+    knowledge: Knowledge, folder: str | Path = ".", origin: str = "knowledge"
+) -> BoundKnowledge:
+    """Read a knowledge's reference and find its regions on it; file names count from `folder`.
+
+    Raises ProcessError for a checksum that does not match, an unknown or contradictory unit, and,
+    all in one message, for regions that are not on the reference or overlap without
+    `allow_overlap`. Raises CloudError for a reference that cannot be read or used.
+    """
+    folder = Path(folder)
+    cloud, unit = _reference(knowledge.reference, knowledge.category, folder, origin)
+    regions: dict[str, np.ndarray] = {}
+    faults = []
+    for region in knowledge.regions:
+        try:
+            given = _given(region, folder, unit)
+            regions[region.name] = np.unique(region_indices(given, cloud))
+        except NrdfError as error:
+            faults.append(f"region '{region.name}': {error}")
+    faults += [] if knowledge.allow_overlap else overlaps(regions)
+    if faults:
+        raise ProcessError(listed(origin, faults))
+    return BoundKnowledge(knowledge, cloud, regions)
+
+
+def overlaps(regions: dict[str, np.ndarray]) -> list[str]:
+    """A line for each two regions, (k,) indices, that share more than a border's few points."""
+    lines = []
+    for (one, first), (other, second) in combinations(regions.items(), 2):
+        common = len(np.intersect1d(first, second, assume_unique=True))
+        if common > COMMON * min(len(first), len(second)):
+            lines.append(
+                f"regions '{one}' and '{other}' overlap: they share {common} of their {len(first)} "
+                f"and {len(second)} points, which would be worked twice; take them out of one, or "
+                "set allow_overlap: true"
+            )
+    return lines
+
+
+def known_unit(cloud: PointCloud, unit: str | None, category: str, what: str, option: str) -> str:
+    """As `unit_and_doubts`; what is doubtful is logged as warnings."""
+    known, doubts = unit_and_doubts(cloud, unit, category, what, option)
+    for doubt in doubts:
+        log.warning("%s", doubt)
+    return known
+
+
+def unit_and_doubts(
+    cloud: PointCloud, unit: str | None, category: str, what: str, option: str
+) -> tuple[str, list[str]]:
+    """The unit of a cloud: the one its file gives, or `unit`, or told by its category's usual size.
+
+    `what` names the cloud and `option` the way to give a unit, in messages. Returned with what is
+    doubtful about it: a guess, a size that its category does not have. Raises ProcessError where
+    two units contradict each other, or where none is given and the size fits several or none.
+    """
+    doubts = []
+    if unit is not None and cloud.unit not in (None, unit):
+        raise ProcessError(f"{what}: {option} is {unit}, but the file says {cloud.unit}")
+    size = float(np.ptp(cloud.points, axis=0).max())
+    known = unit or cloud.unit
+    if known is None:
+        known = guess_unit(size, category)
+        if known is None:
+            raise ProcessError(
+                f"{what} does not say its unit, and its longest side, {size:.4g}, does not tell "
+                f"it{_usual(category)}: give {option} ({', '.join(METRES)})"
+            )
+        told = f"because its longest side is {size:.4g}{_usual(category)}"
+        doubts.append(f"{what} does not say its unit; taken to be {known}, {told}")
+    metres = size * METRES[known]
+    low, high = USUAL_SIZES.get(category, (0.0, np.inf))
+    if not low / _ODD_SIZE <= metres <= high * _ODD_SIZE:
+        odd = f"{metres:.4g} m long{_usual(category)}"
+        doubts.append(f"{what} is {odd}: is its unit, {known}, right?")
+    return known, doubts
+
+
+def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:
+    """The files that knowledge refers to; their names count from `folder`."""
+    names = [knowledge.reference.cloud, *(region.file for region in knowledge.regions)]
+    return [Path(folder) / name for name in names if name is not None]
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal digits.
+
+    Raises ProcessError for what is no regular file, a bag's folder for instance.
+    """
+    digest = hashlib.sha256()
+    with open_file(path, ProcessError) as file:
+        while part := file.read(1 << 20):
+            digest.update(part)
+    return digest.hexdigest()
+
+
+def _usual(category: str) -> str:
+    if category not in USUAL_SIZES:
+        return ""
+    low, high = USUAL_SIZES[category]
+    return f" (a {category} is usually {low:g} to {high:g} m long)"
+
+
+def _reference(
+    reference: Reference, category: str, folder: Path, origin: str
+) -> tuple[PointCloud, str]:
+    """The reference's cloud in metres, and the unit of its file."""
+    if reference.points_m is not None:
+        normals = None if reference.normals is None else _unit_vectors(reference.normals, origin)
+        cloud = PointCloud(np.array(reference.points_m, float), normals, "m", reference.frame)
+        check_cloud(cloud, MINIMUM_POINTS)
+        return cloud, "m"
+    path = folder / str(reference.cloud)
+    cloud = read_cloud(path)
+    found = checksum(path)
+    if reference.sha256 not in (None, found):
+        raise ProcessError(
+            f"{origin}: reference.sha256 is {str(reference.sha256)[:12]}…, but that of {path} is "
+            f"{found[:12]}…: it is not the cloud that the regions were taught on. Use that one, or "
+            f"mark the regions again and write sha256: {found}"
+        )
+    if reference.frame is not None and cloud.frame not in (None, reference.frame):
+        raise ProcessError(
+            f"{origin}: reference.frame is {reference.frame}, but {path} says {cloud.frame}"
+        )
+    check_cloud(cloud, MINIMUM_POINTS)
+    unit = known_unit(cloud, reference.unit, category, str(path), "reference.unit")
+    return replace(in_metres(cloud, unit), frame=cloud.frame or reference.frame), unit
+
+
+def _unit_vectors(vectors: list[tuple[float, float, float]], origin: str) -> np.ndarray:
+    normals = np.array(vectors, float)
+    length = np.linalg.norm(normals, axis=1)
+    if not (np.abs(length - 1) < 0.01).all():
+        worst = int(np.abs(length - 1).argmax())
+        raise CloudError(
+            f"{origin}: reference.normals must have length 1; that of number {worst} is "
+            f"{length[worst]:.4g}"
+        )
+    return np.asarray(normals / length[:, None])
+
+
+def _given(region: Region, folder: Path, unit: str) -> np.ndarray:
+    """A region as `region_indices` takes it, points in metres."""
+    if region.file is None:
+        ways = (region.mask, region.indices, region.points_m)
+        return np.array(next(way for way in ways if way is not None))
+    found = read_region_file(folder / region.file, unit)
+    if len(found) > 1 and region.name not in found:
+        raise ProcessError(f"{region.file} has no region of that name; it has: {', '.join(found)}")
+    values = found[region.name] if region.name in found else next(iter(found.values()))
+    return values if values.ndim == 1 else values * METRES[unit]

@@ -1,0 +1,109 @@
+"""Whether knowledge fits its reference: every process is planned there, as it will be elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.geometry.points import estimate_normals, thin
+from nrdf.geometry.units import in_words
+from nrdf.process.bound_knowledge import BoundKnowledge
+from nrdf.process.knowledge import Process
+from nrdf.process.strategy import strategy_of
+from nrdf.process.taught_paths import normals_under, taught_lines
+from nrdf.regions.model import WORKING_POINTS
+from nrdf.reports.transfer_report import measure_warnings
+from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
+from nrdf.surface.patch import patches_of
+from nrdf.surface.surface import Surface
+from nrdf.toolpath.metrics import Measures, measure
+from nrdf.toolpath.planner import drive, plan
+from nrdf.toolpath.types import Segment
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A process on its region of the reference. fault: why it cannot be done, or ""; warnings:
+    what to look at; segments and measures of its tool path: none where it cannot be done."""
+
+    region: str
+    process: Process
+    fault: str = ""
+    warnings: tuple[str, ...] = ()
+    measures: Measures | None = None
+    segments: tuple[Segment, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """The region and the process, for a message."""
+        return f"region '{self.region}', {self.process.label}"
+
+
+def check(
+    lesson: BoundKnowledge, progress: Callable[[int, int], None] | None = None
+) -> list[Checked]:
+    """Plan and measure every process on the reference; `progress` is told (done, all)."""
+    # The same points as a model would work with.
+    kept = thin(lesson.cloud.points, WORKING_POINTS, np.random.default_rng(0))
+    cloud = lesson.cloud.select(kept)
+    normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
+    surface = Surface(cloud.points, normals)
+    given = given_surface(with_normals_of(lesson.cloud, replace(cloud, normals=normals)))
+    regions = {name: np.flatnonzero(np.isin(kept, of)) for name, of in lesson.regions.items()}
+    steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.steps]
+    checked = []
+    for done, (name, process) in enumerate(steps, 1):
+        checked.append(check_process(surface, name, regions[name], process, given))
+        if progress is not None:
+            progress(done, len(steps))
+    return checked
+
+
+def check_process(
+    surface: Surface,
+    name: str,
+    region: np.ndarray,
+    process: Process,
+    given: GivenSurface | None = None,
+) -> Checked:
+    """One process planned and measured on a region, indices (k,) of the surface's points.
+
+    given: the object as the user gave it, to judge the tool path by.
+    """
+    warnings = []
+    stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
+    if process.trajectory != "taught" and stepover > width:
+        warnings.append(
+            f"stepover_m is {stepover:g} ({in_words('stepover_m', stepover)}), more than the "
+            f"tool's width of {in_words('width_m', width)}: stripes between the lines are left out"
+        )
+    if process.kind in ("sand", "polish") and process.force_n is None:
+        warnings.append(f"{process.kind} without force_n: the robot holds a position, not a force")
+    try:
+        strategy = strategy_of(process)
+        if process.waypoints is None:
+            _check_spacing(surface, region, process)
+            segments = plan(surface, region, strategy)
+        else:
+            lines = taught_lines(process, surface)
+            drawn = [(line.positions, line.quaternions_xyzw) for line in lines]
+            segments = drive(drawn, normals_under(surface, lines), strategy)
+        measures = measure(surface, region, strategy, segments, given)
+    except ProcessError as error:
+        return Checked(name, process, str(error), tuple(warnings))
+    warnings += measure_warnings(process, measures)
+    return Checked(name, process, "", tuple(warnings), measures, tuple(segments))
+
+
+def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:
+    """Raise ProcessError for waypoints farther apart than the region is long, unless meant."""
+    length = max(patch.extent[0] for patch in patches_of(surface, region))
+    if process.spacing_m > length and not process.allow_unusual:
+        spacing = f"{process.spacing_m:g} ({in_words('spacing_m', process.spacing_m)})"
+        raise ProcessError(
+            f"spacing_m is {spacing}, longer than the region, {in_words('length_m', length)}; give "
+            "less, or set allow_unusual: true in the process"
+        )

@@ -1,0 +1,122 @@
+"""A knowledge file to begin with: the reference, its regions, and sensible values for each kind."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from nrdf.errors import ProcessError, unknown_name
+from nrdf.io.cloud import check_cloud, read_cloud
+from nrdf.process.bound_knowledge import bind, checksum, known_unit, overlaps
+from nrdf.process.category import check_category, known_categories
+from nrdf.process.knowledge import Kind, Knowledge
+from nrdf.process.knowledge_file import validated
+from nrdf.regions.files import read_regions
+from nrdf.regions.model import MINIMUM_POINTS
+
+log = logging.getLogger(__name__)
+
+KINDS: tuple[Kind, ...] = get_args(Kind)
+PLACEHOLDER = "my-region"
+
+_PAD = {"name": "pad", "radius_mm": 25, "clearance_mm": 20}
+DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
+    "sand": {
+        "tool": {"name": "sanding disc", "radius_mm": 25, "clearance_mm": 20},
+        "overlap": 0.4, "edge_margin_mm": 10, "lead_deg": 3,
+        "force_n": 20, "force_tolerance_n": 5, "feed_mm_s": 100, "spindle_rpm": 6000,
+    },
+    "polish": {
+        "tool": {"name": "polishing pad", "radius_mm": 25, "clearance_mm": 20},
+        "trajectory": "cross-hatch", "overlap": 0.5, "edge_margin_mm": 5,
+        "force_n": 10, "force_tolerance_n": 3, "feed_mm_s": 80, "spindle_rpm": 2000,
+    },
+    "oil": {
+        "tool": {"name": "oil pad", "radius_mm": 25, "clearance_mm": 20},
+        "overlap": 0.2, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
+    },
+    "paint": {
+        "tool": {"name": "spray gun", "radius_mm": 60},
+        "overlap": 0.5, "standoff_mm": 200, "feed_mm_s": 300,
+        "approach": {"distance_mm": 50, "feed_mm_s": 300},
+        "retract": {"distance_mm": 50, "feed_mm_s": 300},
+    },
+    "clean": {
+        "tool": {"name": "brush", "radius_mm": 30, "clearance_mm": 20},
+        "overlap": 0.3, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
+    },
+    "inspect": {
+        "tool": {"name": "camera", "radius_mm": 80},
+        "overlap": 0.3, "standoff_mm": 300, "feed_mm_s": 50, "spacing_mm": 40,
+    },
+    "custom": {"name": "what is done", "tool": _PAD, "overlap": 0.3, "feed_mm_s": 100},
+}  # fmt: skip
+"""What each kind of process begins with."""
+
+
+def new_knowledge(
+    reference: Path,
+    category: str,
+    folder: Path,
+    regions: Sequence[Path] = (),
+    kinds: Sequence[str] = ("sand",),
+    unit: str | None = None,
+    model: str | None = None,
+    allow_unusual: bool = False,
+) -> Knowledge:
+    """Knowledge to fill in, for a file in `folder`.
+
+    regions: region files, warned about where they overlap; without them there is one placeholder,
+    whose file has still to be made. kinds: of the process on each region, or one for all. unit:
+    of the reference, where its file does not say. model: of the category, where the zoo has none.
+    allow_unusual: take a category that no model is known for.
+
+    Raises ProcessError for an unknown kind or category, kinds that do not fit the regions and an
+    unknown unit; RegionError and CloudError for files that cannot be read, or regions that are not
+    on the reference.
+    """
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ProcessError(unknown_name("process kind", kind, KINDS))
+    if model is not None or not allow_unusual:
+        check_category(category, model)
+    cloud = read_cloud(reference)
+    check_cloud(cloud, MINIMUM_POINTS)
+    known = known_unit(cloud, unit, category, str(reference), "--unit")
+    rows = []
+    for path in regions:
+        found = read_regions([path], known)
+        rows += [{"name": name, "file": _relative(path, folder)} for name in found]
+    rows = rows or [{"name": PLACEHOLDER, "file": f"{PLACEHOLDER}.ply"}]
+    if len(kinds) not in (1, len(rows)):
+        raise ProcessError(
+            f"{len(kinds)} kinds for {len(rows)} regions; give one for each, or one for all"
+        )
+    every = list(kinds) * (len(rows) // len(kinds))
+    content = {
+        "category": category,
+        "allow_unusual": category not in known_categories(),
+        "reference": {
+            "cloud": _relative(reference, folder),
+            "sha256": checksum(reference),
+            "unit": None if cloud.unit else known,
+        },
+        "regions": [
+            {**row, "processes": [{"kind": kind, **DEFAULTS[kind]}]}  # type: ignore[index]
+            for row, kind in zip(rows, every, strict=True)
+        ],
+    }
+    knowledge = validated(content, "the new file")
+    if regions:
+        lesson = bind(knowledge.model_copy(update={"allow_overlap": True}), folder, "the new file")
+        for line in overlaps(lesson.regions):
+            log.warning("%s", line)
+    return knowledge
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """The path as seen from a folder, with forward slashes on every system."""
+    return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()

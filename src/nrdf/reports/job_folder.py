@@ -1,0 +1,124 @@
+"""A transfer as a folder: the knowledge for the new object, its tool paths, report and pictures."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.io.cloud import write_cloud
+from nrdf.io.output import REPORT, write_json
+from nrdf.process.bound_knowledge import checksum, overlaps
+from nrdf.process.knowledge import Knowledge, Reference, Region
+from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.limits import Limits
+from nrdf.process.transfer import TransferResult, touched
+from nrdf.regions.files import write_matches
+from nrdf.reports.page import write_page
+from nrdf.reports.transfer_report import report_of
+from nrdf.toolpath.types import Job, write_job
+from nrdf.viz.picture import Panel, draw_regions, render_details
+
+KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
+PAGE, PICTURE = "report.html", "picture.png"
+_WHOLE, _DETAIL = 540, 280  # pixels of a view; the page shows details smaller
+
+
+def write_transfer(
+    folder: Path,
+    transferred: TransferResult,
+    limits: Limits,
+    title: str,
+    origin: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Write a transfer into an existing folder; what its report.json says.
+
+    knowledge.yaml, target.ply (in metres, in the target's own frame), regions/, toolpaths.json
+    (for `nrdf export`), report.json, report.html and picture.png. `title` names the target,
+    `origin` (command, model, versions, ...) is added to the report. Without any tool path there is
+    neither knowledge.yaml nor toolpaths.json. Raises OutputError if something cannot be written.
+    """
+    target = transferred.target
+    write_cloud(folder / TARGET, target)
+    (folder / REGIONS).mkdir()
+    found = {n: r.match for n, r in transferred.regions.items() if not r.missing}
+    write_matches(folder / REGIONS, target, found)
+    job = job_of(transferred)
+    if job.paths:
+        write_job(folder, job)
+        write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
+    start = time.perf_counter()
+    panel = panel_of(transferred, title)
+    with ThreadPoolExecutor(2) as pool:
+        whole = pool.submit(draw_regions, [panel], folder / PICTURE, _WHOLE)
+        details = pool.submit(render_details, panel, list(panel.regions), _DETAIL).result()
+        whole.result()
+    seconds = {**transferred.seconds, "pictures": time.perf_counter() - start}
+    report = {"title": title, **report_of(transferred, limits), **origin}
+    report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
+    report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_page(folder / PAGE, report, folder / PICTURE, details)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    report["files"] = [*files, REPORT]
+    write_json(folder / REPORT, report)
+    return report
+
+
+def job_of(transferred: TransferResult) -> Job:
+    """The tool paths of a transfer, in the order in which they are driven."""
+    return Job(
+        category=transferred.lesson.knowledge.category,
+        frame=transferred.target.frame or "target",
+        paths=tuple(step.path for step in transferred.paths if step.path is not None),
+        pose=transferred.pose,
+    )
+
+
+def panel_of(transferred: TransferResult, title: str, note: str = "") -> Panel:
+    """The target, upright, with its regions and the lines of its tool paths, for a picture."""
+    turn = np.eye(3) if transferred.pose is None else transferred.pose.rotation
+    regions = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
+    lines: dict[str, list[np.ndarray]] = {}
+    for step in transferred.paths:
+        if step.path is not None:
+            work = [s for s in step.path.segments if s.kind == "process"]
+            height = step.process.standoff_m
+            drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
+            lines.setdefault(step.region, []).extend(line @ turn for line in drawn)
+    target = transferred.target
+    normals = None if target.normals is None else target.normals @ turn
+    return Panel(title, target.points @ turn, normals, regions, note, lines)
+
+
+def _knowledge(transferred: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
+    """What was taught, as it is on the target: the same format, for the same kind of use."""
+    taught = transferred.lesson.knowledge
+    regions = []
+    for region in taught.regions:
+        # In the file's order, whatever the order in which they are driven.
+        done = [
+            step.process
+            for number in range(len(region.processes))
+            for step in transferred.paths
+            if (step.region, step.number) == (region.name, number) and step.path is not None
+        ]
+        if done:
+            file = f"{REGIONS}/{region.name}.ply"
+            regions.append(Region(name=region.name, file=file, processes=done))
+    found = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
+    frame = transferred.target.frame
+    reference = Reference(cloud=TARGET, sha256=checksum(folder / TARGET), frame=frame)
+    keys = ("command", "knowledge", "target", "model", "date")
+    return Knowledge(
+        category=taught.category,
+        reference=reference,
+        allow_unusual=taught.allow_unusual,
+        allow_overlap=taught.allow_overlap or bool(overlaps(found)),
+        regions=regions,
+        origin={key: origin[key] for key in keys if key in origin},
+    )

@@ -1,0 +1,214 @@
+"""The report of a transfer: what was found, what is driven, how well, and what to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nrdf.geometry.units import in_words
+from nrdf.process.knowledge import Process
+from nrdf.process.limits import Limits, doubts_of
+from nrdf.process.transfer import PathResult, TransferResult
+from nrdf.toolpath.metrics import NO_ROOM, REASONS, Measures
+from nrdf.toolpath.types import pose_of
+
+FIGURES = (
+    "worked · left out · unreached", "overlap", "line spacing, mean · worst",
+    "largest step · turn · turn by mm", "off the object, 95 % · worst",
+    "off the planned surface, 99 % · worst", "axis off, 99 %", "length", "time",
+)  # fmt: skip
+SHORT_FIGURES = (
+    "worked, %", "left out, %", "missed, %", "lines, mm", "step, mm", "turn, °", "off, mm",
+    "time, s",
+)  # fmt: skip
+"""Shares of the whole region; the widest place between lines; the largest step and turn between
+waypoints; the distance from the object as given, 95th percentile."""
+_MOST_UNREACHED = 0.03
+_LARGEST_STEP = 2.0  # times the spacing of waypoints
+_LARGEST_TURN_RAD = np.radians(30.0)
+_WIDEST_LINES = 1.15  # times the stepover
+_FARTHEST_M = 0.001
+_STEEPEST_RAD = np.radians(5.0)
+
+
+def report_of(transferred: TransferResult, limits: Limits) -> dict[str, Any]:
+    """Everything of a transfer that a report says, as plain values; lengths in metres."""
+    regions = transferred.regions
+    paths = [_path(step, bool(regions[step.region].missing)) for step in transferred.paths]
+    driven = [step.measures for step in transferred.paths if step.measures is not None]
+    doubts = doubts_of(transferred)
+    # A skipped region is warned about as such.
+    skipped = tuple(f"region '{name}':" for name, r in regions.items() if r.missing)
+    warnings = [doubt for doubt in doubts if not doubt.startswith(skipped)]
+    warnings += transferred.warnings
+    for step in paths:
+        if step["warnings"]:
+            said = "; ".join(step["warnings"])
+            warnings.append(f"region '{step['region']}', {step['process']}: {said}")
+    return {
+        "category": transferred.lesson.knowledge.category,
+        "unit": "m",
+        "frame": transferred.target.frame,
+        "pose": pose_of(transferred.pose),
+        "regions": _regions(transferred),
+        "paths": paths,
+        "total": {
+            "paths": len(driven),
+            "skipped": len(transferred.paths) - len(driven),
+            "path_length_m": sum(m.path_length_m for m in driven),
+            "process_length_m": sum(m.process_length_m for m in driven),
+            "cycle_time_s": sum(m.cycle_time_s for m in driven),
+        },
+        "warnings": warnings,
+        "doubts": doubts,
+        "kind": None if transferred.kind is None else transferred.kind.describe(),
+        "limits": {
+            "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
+            "not_met": limits.broken(transferred),
+        },
+    }
+
+
+def _regions(transferred: TransferResult) -> dict[str, Any]:
+    reference, target = transferred.lesson, transferred.target
+    regions = {}
+    for name, region in transferred.regions.items():
+        match = region.match
+        regions[name] = {
+            "found": not region.missing,
+            "skipped_because": region.missing or None,
+            "confidence": round(match.score, 4),
+            "points": len(match.indices),
+            "share_of_target": round(len(match.indices) / len(target), 5),
+            "share_of_reference": round(
+                len(reference.regions[name]) / len(reference.cloud), 5
+            ),
+        }  # fmt: skip
+    return regions
+
+
+def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
+    process = step.process
+    content: dict[str, Any] = {
+        "region": step.region,
+        "number": step.number,
+        "process": process.label,
+        "kind": process.kind,
+        "transfer": step.way,
+        "planned": step.path is not None,
+        "left_out_because": step.reason or None,
+        "asked": _asked(process),
+        "warnings": [*step.warnings],
+    }
+    if step.path is not None and step.measures is not None:
+        process_segments = [s for s in step.path.segments if s.kind == "process"]
+        content["lines"] = len({segment.line for segment in process_segments})
+        content["waypoints"] = sum(len(segment.positions) for segment in step.path.segments)
+        content["measures"] = vars(step.measures)
+        content["warnings"] += measure_warnings(process, step.measures)
+    elif not skipped:
+        content["warnings"].append(f"no tool path: {step.reason}")
+    return content
+
+
+def _asked(process: Process) -> dict[str, Any]:
+    """What the process asks for, apart from waypoints."""
+    content = process.model_dump(mode="json", exclude_none=True, exclude={"waypoints", "name"})
+    content["stepover_m"] = process.distance_between_lines_m
+    return content
+
+
+def measure_warnings(process: Process, measures: Measures) -> list[str]:
+    """What a person should look at before a path is driven."""
+    lines = []
+    if measures.left_out[NO_ROOM] > 0.0:
+        room = in_words("clearance_m", process.tool.clearance_m)
+        lines.append(
+            f"{measures.left_out[NO_ROOM]:.1%} of the region has less than {room} free before it, "
+            "and is left out"
+        )
+    if measures.unreached > _MOST_UNREACHED:
+        lines.append(
+            f"the tool does not reach {measures.unreached:.1%} of the region, beside what is left "
+            "out"
+        )
+    worst, stepover = measures.line_spacing_worst_m, process.distance_between_lines_m
+    if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
+        lines.append(
+            f"lines are up to {in_words('spacing_m', worst)} apart; "
+            f"{in_words('stepover_m', stepover)} were asked for"
+        )
+    if process.trajectory != "taught" and measures.step_worst_m > _LARGEST_STEP * process.spacing_m:
+        step, asked = (in_words("_m", x) for x in (measures.step_worst_m, process.spacing_m))
+        lines.append(f"a step of {step} between neighbouring waypoints; {asked} were asked for")
+    if measures.turn_worst_rad > _LARGEST_TURN_RAD:
+        turn = in_words("_rad", measures.turn_worst_rad)
+        lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
+    lines += _distance_warnings(process, measures)
+    if measures.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
+        error = in_words("error_rad", measures.axis_error_99_rad)
+        lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
+    return lines
+
+
+def _distance_warnings(process: Process, measures: Measures) -> list[str]:
+    """By the object as it was given, where that is known: the plan cannot judge itself."""
+    planned, true = measures.surface_distance_99_m, measures.true_distance_99_m
+    if true is not None and true > max(_FARTHEST_M, measures.resolution_m or 0.0):
+        away = in_words("_m", true)
+        return [f"1 % of the way on the surface is more than {away} off {measures.judged_by}"]
+    if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
+        away = in_words("_m", planned)
+        return [f"1 % of the waypoints are more than {away} off the surface planned on"]
+    return []
+
+
+def left_out_in_words(left_out: Mapping[str, float]) -> str:
+    """What is left out of a region, share by share, or a dash."""
+    shares = [f"{REASONS.get(why, why)} {share:.1%}" for why, share in left_out.items() if share]
+    return ", ".join(shares) or "–"
+
+
+def shares_in_words(measures: Mapping[str, Any]) -> str:
+    """What is worked, left out and not reached of a whole region, in per cent."""
+    left_out = sum(measures["left_out"].values())
+    shares = (measures["coverage"], left_out, measures["unreached"])
+    return " · ".join(f"{100.0 * share:.1f}" for share in shares) + " %"
+
+
+def jump_in_words(measures: Mapping[str, Any]) -> str:
+    """The largest step between neighbouring waypoints, and the largest turn."""
+    turn = f"{np.degrees(measures['turn_worst_rad']):.0f}°"
+    return f"{_millimetres(measures['step_worst_m'])} · {turn}"
+
+
+def figures(measures: Mapping[str, Any]) -> list[str]:
+    """A tool path's measures as people read them, one for each of `FIGURES`."""
+    length, time = f"{measures['process_length_m']:.2f} m", f"{measures['cycle_time_s']:.0f} s"
+    spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
+    true = _millimetres(measures["true_distance_95_m"], measures["true_distance_worst_m"])
+    away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
+    shares, overlap = shares_in_words(measures), f"{measures['overlap']:.0%}"
+    axis = f"{np.degrees(measures['axis_error_99_rad']):.1f}°"
+    jump = jump_in_words(measures)
+    jump += f" · {np.degrees(measures['bend_worst_rad_m']) / 1e3:.1f}°/mm"
+    return [shares, overlap, spacing, jump, true, away, axis, length, time]
+
+
+def short_figures(measures: Mapping[str, Any]) -> list[str]:
+    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+    shares = shares_in_words(measures).removesuffix(" %").split(" · ")
+    lengths = ("line_spacing_worst_m", "step_worst_m", "true_distance_95_m")
+    spacing, step, off = (_millimetres(measures[name]).removesuffix(" mm") for name in lengths)
+    turn, time = np.degrees(measures["turn_worst_rad"]), measures["cycle_time_s"]
+    return [*shares, spacing, step, f"{turn:.0f}", off, f"{time:.0f}"]
+
+
+def _millimetres(*lengths: float | None) -> str:
+    """Lengths in metres side by side in millimetres; a dash where one is missing."""
+    known = [length for length in lengths if length is not None]
+    if len(known) < len(lengths):
+        return "–"
+    return " · ".join(f"{1e3 * length:.1f}" for length in known) + " mm"

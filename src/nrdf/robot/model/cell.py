@@ -1,0 +1,221 @@
+"""The work cell: an arm with a tool, an object on a turntable before it, and the floor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nrdf.robot.model.arm import Arm
+from nrdf.robot.model.kinematics import Chain, Frames
+from nrdf.robot.model.signed_distance import SignedDistanceField
+from nrdf.robot.model.spheres import Spheres, cover_capsule
+from nrdf.robot.model.tool import Tool
+
+COLUMN_M = 0.09
+"""Radius of the column that a raised base stands on."""
+_ALONG = 0.9  # cosine to up from which a direction is none to face
+_NEIGHBOURS = 2  # links that far apart along the arm cannot be checked against each other
+_ALWAYS = 0.3  # share of random places in which two links must touch to be taken for neighbours
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the arm's base and the object stand.
+
+    The cell's frame has z up and its origin on the floor under the middle of the object, on the
+    turntable's axis; x is where the object faces at turn 0 (the category's own x).
+
+    base_m: (3,) of the arm's base; base_yaw_rad: about z, from the cell's x to the base's x;
+    stand_m: height of the object's lowest point above the floor; turns_rad: (k,) of the turntable.
+    """
+
+    base_m: tuple[float, float, float]
+    base_yaw_rad: float
+    stand_m: float
+    turns_rad: tuple[float, ...]
+
+    def T_cell_base(self) -> np.ndarray:
+        return _pose(self.base_yaw_rad, self.base_m)
+
+    def T_cell_object(self, solid: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
+        """Poses (k, 4, 4) of the object's frame at each turn; upright: (3, 3), as `upright_turn`
+        has it."""
+        turned = solid.samples @ upright.T
+        low, high = turned.min(axis=0), turned.max(axis=0)
+        standing = np.eye(4)
+        standing[:3, :3] = upright
+        standing[:3, 3] = -0.5 * (low + high)
+        standing[2, 3] = self.stand_m - float(low[2])
+        return np.array([_pose(turn, (0.0, 0.0, 0.0)) @ standing for turn in self.turns_rad])
+
+    def T_base_object(self, solid: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
+        return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(solid, upright)
+
+
+def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
+    pose = np.eye(4)
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    pose[:3, 3] = place
+    return pose
+
+
+def upright_turn(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) from an object's frame to the cell's that takes `up` (3,) to z, and
+    `forward` (3,), or what is left of it, to x."""
+    up = np.asarray(up, float) / np.linalg.norm(up)
+    ahead = np.asarray(forward, float) / np.linalg.norm(forward)
+    if abs(ahead @ up) > _ALONG:
+        ahead = np.eye(3)[int(np.argmin(np.abs(up)))]
+    ahead = ahead - (ahead @ up) * up
+    ahead /= np.linalg.norm(ahead)
+    return np.stack([ahead, np.cross(up, ahead), up])
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Everything that clearances are asked of, in the frame of the arm's base.
+
+    chain: with the tool's centre point. spheres: of arm and tool; few: fewer and larger ones, for
+    arm against arm. poses: (k, 4, 4), T_base_object at each turn. turntable_m: (3,) on the
+    turntable's axis. floor_m: its height. pairs: (p, 2) of those that must not meet.
+    """
+
+    arm: Arm
+    tool: Tool
+    chain: Chain
+    spheres: Spheres
+    few: Spheres
+    solid: SignedDistanceField
+    poses: np.ndarray
+    turntable_m: np.ndarray
+    floor_m: float
+    pairs: np.ndarray
+    turns_rad: tuple[float, ...]
+
+    @staticmethod
+    def build(
+        arm: Arm, tool: Tool, solid: SignedDistanceField, placement: Placement, upright: np.ndarray
+    ) -> Cell:
+        size, flange = arm.chain.size, arm.chain.T_last_tool
+        column = _column(-placement.base_m[2])
+        few = arm.few_spheres + column + tool.spheres(size, flange, 4.0)
+        return Cell(
+            arm=arm,
+            tool=tool,
+            chain=arm.chain.with_tool(tool.T_flange_tcp),
+            spheres=arm.spheres + column + tool.spheres(size, flange),
+            few=few,
+            solid=solid,
+            poses=placement.T_base_object(solid, upright),
+            turntable_m=np.linalg.inv(placement.T_cell_base())[:3, 3],
+            floor_m=-placement.base_m[2],
+            pairs=_pairs(arm.chain, few),
+            turns_rad=placement.turns_rad,
+        )
+
+    def placed(self, placement: Placement, upright: np.ndarray) -> Cell:
+        """The same arm, tool and object at another place."""
+        return Cell.build(self.arm, self.tool, self.solid, placement, upright)
+
+    def shifted(self, shift_m: np.ndarray) -> Cell:
+        """The same with the object off its place by (3,), in its own frame."""
+        shift = np.eye(4)
+        shift[:3, 3] = shift_m
+        return replace(self, poses=self.poses @ shift)
+
+    def turned(self, angles_rad: np.ndarray) -> Cell:
+        """The same with the object at other turns (k,)."""
+        poses = []
+        for angle in angles_rad - self.turns_rad[0]:
+            about = _pose(float(angle), (0.0, 0.0, 0.0))
+            about[:3, 3] = self.turntable_m - about[:3, :3] @ self.turntable_m
+            poses.append(about @ self.poses[0])
+        return replace(self, poses=np.array(poses), turns_rad=tuple(angles_rad.tolist()))
+
+    def to_base(
+        self, turn: np.ndarray, points: np.ndarray, vectors: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points and vectors (b, 3) of the object's frame in the base's, at turns (b,)."""
+        pose = self.poses[turn]
+        placed = np.einsum("bij,bj->bi", pose[:, :3, :3], points) + pose[:, :3, 3]
+        return placed, np.einsum("bij,bj->bi", pose[:, :3, :3], vectors)
+
+    def clearance(self, frames: Frames, turn: np.ndarray) -> Clearance:
+        """Distance between arm or tool and object or floor, for configurations (b,) at turns."""
+        centres = self.spheres.at(frames.rotations, frames.places)
+        pose = self.poses[turn]
+        local = np.matmul(centres - pose[:, None, :3, 3], pose[:, :3, :3])
+        away, gradient = self.solid.distances(local)
+        away = away - self.spheres.radii
+        # The base stands on the floor.
+        low = centres[..., 2] - self.spheres.radii - self.floor_m
+        low[:, self.spheres.links == 0] = np.inf
+        row = np.arange(len(away))
+        nearest, lowest = away.argmin(axis=1), low.argmin(axis=1)
+        closest, height = away[row, nearest], low[row, lowest]
+        on_floor = height < closest
+        sphere = np.where(on_floor, lowest, nearest)
+        slope = np.einsum("bij,bj->bi", pose[:, :3, :3], gradient[row, nearest])
+        slope = np.where(on_floor[:, None], [0.0, 0.0, 1.0], slope)
+        least = np.where(on_floor, height, closest)
+        return Clearance(least, sphere, centres[row, sphere], slope, on_floor)
+
+    def own_clearance(self, frames: Frames) -> np.ndarray:
+        """Least distance (b,) between parts of arm and tool that are not neighbours."""
+        if not len(self.pairs):
+            return np.full(len(frames.tcp), np.inf)
+        centres = self.few.at(frames.rotations, frames.places).astype(np.float32)
+        (one, two), size = self.pairs.T, len(self.few.radii)
+        # All squared distances by one product: the pairs alone, with their offsets, take longer.
+        square = np.einsum("bma,bma->bm", centres, centres)
+        product = np.matmul(centres, np.swapaxes(centres, 1, 2)).reshape(len(centres), size * size)
+        away = square[:, one] + square[:, two]
+        away -= 2.0 * product[:, one * size + two]
+        away = np.sqrt(np.maximum(away, 0.0))
+        away -= (self.few.radii[one] + self.few.radii[two]).astype(np.float32)
+        return np.asarray(away.min(axis=1), float)
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """least: (b,), m, negative where something is hit; sphere: (b,) that is nearest, point: (b, 3)
+    its centre, slope: (b, 3) the direction away; floor: (b,) whether it is the floor."""
+
+    least: np.ndarray
+    sphere: np.ndarray
+    point: np.ndarray
+    slope: np.ndarray
+    floor: np.ndarray
+
+
+def _column(floor: float) -> Spheres:
+    """The column that a raised base stands on, from the floor up."""
+    if floor > -COLUMN_M:
+        return Spheres.none()
+    start, end = np.array([0.0, 0.0, floor]), np.array([0.0, 0.0, -0.5 * COLUMN_M])
+    centres, radius = cover_capsule(start, end, COLUMN_M)
+    return Spheres(centres, np.full(len(centres), radius), np.zeros(len(centres), int))
+
+
+def _pairs(chain: Chain, spheres: Spheres) -> np.ndarray:
+    """Pairs of spheres whose links can meet but are not neighbours."""
+    rng = np.random.default_rng(0)
+    joints = rng.uniform(
+        np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi), (200, chain.size)
+    )
+    frames = chain.frames(joints)
+    centres = spheres.at(frames.rotations, frames.places)
+    links = np.unique(spheres.links)
+    found = []
+    for i, one in enumerate(links):
+        for two in links[i + 1 :]:
+            if two - one < _NEIGHBOURS:
+                continue
+            a, b = np.flatnonzero(spheres.links == one), np.flatnonzero(spheres.links == two)
+            offset = np.linalg.norm(centres[:, a, None] - centres[:, None, b], axis=-1)
+            meet = offset < spheres.radii[a][:, None] + spheres.radii[b]
+            if meet.any(axis=(1, 2)).mean() < _ALWAYS:
+                found.append(np.stack(np.meshgrid(a, b, indexing="ij"), axis=-1).reshape(-1, 2))
+    return np.concatenate(found) if found else np.zeros((0, 2), int)

@@ -1,0 +1,48 @@
+"""A simulation as a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from nrdf.io.output import REPORT, write_json
+from nrdf.robot.report.metrics import report_of
+from nrdf.robot.report.page import write_page
+from nrdf.robot.report.pictures import draw
+from nrdf.robot.report.trajectories import write_bag, write_csv, write_script
+from nrdf.robot.simulation.simulate import Simulated
+
+
+def write_simulation(
+    folder: Path,
+    simulated: Simulated,
+    title: str,
+    origin: Mapping[str, Any],
+    pictures: bool = True,
+    film: bool = True,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """Write a simulation into an existing folder; what its report.json says.
+
+    joints.csv, joints.bag (with rosbags) and joints.script (arms of six axes), report.json,
+    report.html, and, where this machine can draw, picture.png, coverage.png and film.webp. Raises
+    OutputError if something cannot be written.
+    """
+    report = {"title": title, **report_of(simulated), **origin}
+    report["seconds"] = {name: round(value, 3) for name, value in simulated.seconds.items()}
+    report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_csv(folder, simulated)
+    if not write_bag(folder, simulated):
+        report["warnings"].append("no ROS 2 bag: it needs rosbags, pip install 'nrdf[ros]'")
+    if len(simulated.arm.joint_names) == 6:
+        write_script(folder, simulated)
+    if pictures:
+        missing = draw(folder, simulated, film, progress)
+        report["warnings"] += [missing] if missing else []
+    write_page(folder, report)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    report["files"] = [*files, REPORT]
+    write_json(folder / REPORT, report)
+    return report

@@ -1,0 +1,290 @@
+"""Pictures and a short film of the arm at work, drawn by MuJoCo."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.io.ply import write_atomically
+from nrdf.robot.model.engine import mujoco
+from nrdf.robot.simulation.execute import Log
+from nrdf.robot.simulation.scene import specification
+from nrdf.robot.simulation.simulate import DrivenPath, Simulated
+from nrdf.viz.picture import region_colours
+
+log = logging.getLogger(__name__)
+
+FILM, STILL, COVERAGE = "film.webp", "picture.png", "coverage.png"
+_SIZE, _FILM_SIZE = (1080, 810), (520, 400)
+_FRAMES, _FRAME_MS = 90, 120
+_PLAIN, _DONE, _MISSED = (0.80, 0.81, 0.83), (0.10, 0.62, 0.35), (0.84, 0.25, 0.15)
+_LEFT_OUT = (0.93, 0.70, 0.20)
+
+
+def draw(
+    folder: Path,
+    simulated: Simulated,
+    film: bool = True,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> str | None:
+    """Write the pictures and the film; why there are none, where this machine cannot draw."""
+    try:
+        studio = _Studio(simulated, "regions")
+    except Exception as error:  # whatever OpenGL raises
+        return f"no pictures: this machine has no OpenGL that MuJoCo can draw with ({error})"
+    with studio:
+        first = max(
+            simulated.paths, key=lambda driven: driven.path.tool_radius_m * _longest(driven)
+        )
+        _save(
+            folder / STILL,
+            studio.image(first, item := _busiest(first.logs), len(item.joints) // 2, *_SIZE),
+        )
+        if film:
+            _film(folder / FILM, studio, simulated, progress)
+    with _Studio(simulated, "coverage") as studio:
+        images = [studio.object_image(angle, 720, 640) for angle in (-0.6, 2.4)]
+        _save(folder / COVERAGE, np.concatenate(images, axis=1))
+    return None
+
+
+def _longest(driven: DrivenPath) -> int:
+    return max((len(log.joints) for log in driven.logs if log.action.kind == "process"), default=0)
+
+
+def _busiest(logs: Sequence[Log]) -> Log:
+    return max(
+        (item for item in logs if item.action.kind == "process"), key=lambda item: len(item.joints)
+    )
+
+
+def _save(path: Path, image: np.ndarray) -> None:
+    from PIL import Image
+
+    drawn = io.BytesIO()
+    Image.fromarray(image).save(drawn, "png")
+    write_atomically(path, [drawn.getbuffer()])
+
+
+def _film(
+    path: Path,
+    studio: _Studio,
+    simulated: Simulated,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Evenly through the whole time, faster than it was."""
+    from PIL import Image
+
+    every = [(driven, item) for driven in simulated.paths for item in driven.logs]
+    ends = np.cumsum([len(item.joints) for _, item in every])
+    images = []
+    for k, step in enumerate(np.linspace(0, ends[-1] - 1, _FRAMES).astype(int)):
+        which = int(np.searchsorted(ends, step, side="right"))
+        driven, item = every[which]
+        at = int(step - (ends[which] - len(item.joints)))
+        images.append(Image.fromarray(studio.image(driven, item, at, *_FILM_SIZE)))
+        progress(k + 1, _FRAMES)
+    film = io.BytesIO()
+    images[0].save(
+        film, "webp", save_all=True, append_images=images[1:], duration=_FRAME_MS, loop=0,
+        quality=60,
+    )  # fmt: skip
+    write_atomically(path, [film.getbuffer()])
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    model: Any
+    data: Any
+    joints: np.ndarray
+    object_id: int
+
+
+class _Studio:
+    """The cell with the object's mesh in the colours of its regions, or of what was covered."""
+
+    def __init__(self, simulated: Simulated, colours: str) -> None:
+        self.simulated = simulated
+        self._parts = _parts(simulated, colours)
+        self._drawn: dict[str, _Drawn] = {}
+        self._renderers: dict[tuple[str, int, int], Any] = {}
+        # Fails here, where it can be caught, if there is nothing to draw with.
+        self._renderer(simulated.paths[0], 64, 64)
+
+    def __enter__(self) -> _Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for renderer in self._renderers.values():
+            renderer.close()
+
+    def image(self, driven: DrivenPath, item: Log, at: int, width: int, height: int) -> np.ndarray:
+        """The cell (h, w, 3) at one step of an action, with the tool path on the object."""
+        drawn = self._model(driven)
+        pose = driven.cell.poses[item.action.turn]
+        self._place(drawn, item.joints[at], pose)
+        renderer = self._renderer(driven, width, height)
+        camera = mujoco.MjvCamera()
+        middle = 0.6 * (pose[:3, :3] @ self._middle() + pose[:3, 3])
+        camera.lookat[:] = middle + np.array([0.0, 0.0, 0.1])
+        camera.distance, camera.azimuth, camera.elevation = 2.3, 118.0, -16.0
+        renderer.update_scene(drawn.data, camera)
+        # Shadows cost half of the time, and a small picture does well without.
+        shadows = width > _FILM_SIZE[0]
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
+        _add_lines(renderer.scene, driven, pose)
+        return np.asarray(renderer.render())
+
+    def object_image(self, angle: float, width: int, height: int) -> np.ndarray:
+        """The object alone (h, w, 3), from an angle about its upright axis."""
+        driven = self.simulated.paths[0]
+        drawn = self._model(driven)
+        pose = driven.cell.poses[0]
+        self._place(drawn, driven.logs[0].joints[0], pose)
+        renderer = self._renderer(driven, width, height)
+        camera = mujoco.MjvCamera()
+        camera.lookat[:] = pose[:3, :3] @ self._middle() + pose[:3, 3]
+        size = float(np.linalg.norm(np.subtract(*self.simulated.solid.box)))
+        camera.distance, camera.elevation = 1.15 * size + 0.2, -20.0
+        camera.azimuth = np.degrees(angle)
+        option = mujoco.MjvOption()
+        option.geomgroup[:] = 0
+        option.geomgroup[2] = 1
+        renderer.update_scene(drawn.data, camera, option)
+        return np.asarray(renderer.render())
+
+    def _middle(self) -> np.ndarray:
+        low, high = self.simulated.solid.box
+        return np.asarray(0.5 * (low + high))
+
+    def _place(self, drawn: _Drawn, joints: np.ndarray, pose: np.ndarray) -> None:
+        from scipy.spatial.transform import Rotation
+
+        drawn.data.qpos[drawn.joints] = joints
+        drawn.data.mocap_pos[drawn.object_id] = pose[:3, 3]
+        quaternion = Rotation.from_matrix(pose[:3, :3]).as_quat()
+        drawn.data.mocap_quat[drawn.object_id] = np.roll(quaternion, 1)
+        mujoco.mj_forward(drawn.model, drawn.data)
+
+    def _model(self, driven: DrivenPath) -> _Drawn:
+        key = f"{driven.path.tool} {driven.path.tool_radius_m}"
+        if key not in self._drawn:
+            self._drawn[key] = _build(driven, self._parts)
+        return self._drawn[key]
+
+    def _renderer(self, driven: DrivenPath, width: int, height: int) -> Any:
+        key = (f"{driven.path.tool} {driven.path.tool_radius_m}", width, height)
+        if key not in self._renderers:
+            model = self._model(driven).model
+            self._renderers[key] = mujoco.Renderer(model, height, width, max_geom=4000)
+        return self._renderers[key]
+
+
+def _build(
+    driven: DrivenPath, parts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]
+) -> _Drawn:
+    cell = driven.cell
+    spec = specification(cell)
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1440, 1080
+    spec.visual.headlight.ambient[:] = 0.42
+    spec.visual.headlight.diffuse[:] = 0.42
+    spec.visual.map.znear = 0.005
+    sky = spec.add_texture(name="nrdf_sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+    sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+    sky.rgb1[:], sky.rgb2[:] = (0.97, 0.98, 1.0), (0.86, 0.89, 0.93)
+    sky.width = sky.height = 64
+    world = spec.worldbody
+    world.add_light(pos=[-0.6, -1.2, 2.6], dir=[0.3, 0.5, -1.0], diffuse=[0.5, 0.5, 0.5])
+    world.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[3.0, 3.0, 0.1], pos=[0.6, 0.0, cell.floor_m],
+        rgba=[0.90, 0.91, 0.93, 1.0],
+    )  # fmt: skip
+    if cell.floor_m < -0.02:
+        world.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.09, 0.0, 0.0],
+            fromto=[0.0, 0.0, cell.floor_m, 0.0, 0.0, 0.0], rgba=[0.45, 0.47, 0.5, 1.0],
+        )  # fmt: skip
+    body = world.add_body(name="nrdf_object", mocap=True)
+    for number, (vertices, faces, colour) in enumerate(parts):
+        name = f"nrdf_part_{number}"
+        mesh = spec.add_mesh(name=name)
+        mesh.uservert, mesh.userface = vertices.ravel().tolist(), faces.ravel().tolist()
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=[*colour, 1.0], group=2,
+            contype=0, conaffinity=0,
+        )  # fmt: skip
+    model = spec.compile()
+    joints = model.jnt_qposadr[[model.joint(name).id for name in cell.arm.joint_names]]
+    mocap = int(model.body_mocapid[model.body("nrdf_object").id])
+    return _Drawn(model, mujoco.MjData(model), joints, mocap)
+
+
+def _parts(
+    simulated: Simulated, colours: str
+) -> list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
+    """The object's mesh cut by colour: vertices, faces and colour of each piece."""
+    solid, lesson = simulated.solid, simulated.work.lesson
+    points = lesson.cloud.points
+    label = np.zeros(len(points), int)
+    palette: list[tuple[float, ...]] = [_PLAIN]
+    if colours == "regions":
+        inks = region_colours(list(lesson.regions))
+        for number, name in enumerate(lesson.regions, 1):
+            label[lesson.regions[name]] = number
+            palette.append(tuple(0.55 * inks[name] + 0.45))
+    else:
+        palette += [_DONE, _MISSED, _LEFT_OUT]
+        for driven in simulated.paths:
+            out = driven.outcome
+            found = np.where(out.worked, 1, np.where(out.wanted, 2, 3))
+            region = lesson.regions[driven.path.region]
+            nearest = cKDTree(points[out.region_points]).query(points[region])[1]
+            label[region] = found[nearest]
+    normals = lesson.cloud.normals
+    corners = solid.vertices[solid.faces]
+    middle = corners.mean(axis=1)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-15)
+    distance, near = cKDTree(points).query(middle, 6)
+    if normals is not None:
+        # On a thin part the nearest point may be of the other side.
+        alike = np.einsum("fka,fa->fk", normals[near], facing)
+        distance = distance + 0.02 * (1.0 - alike)
+    owner = label[near[np.arange(len(near)), distance.argmin(axis=1)]]
+    made = []
+    for number, colour in enumerate(palette):
+        faces = solid.faces[owner == number]
+        if len(faces) >= 4:
+            used, index = np.unique(faces, return_inverse=True)
+            made.append((solid.vertices[used], index.reshape(-1, 3), colour))
+    return made
+
+
+def _add_lines(scene: Any, driven: DrivenPath, pose: np.ndarray) -> None:
+    """The path's lines, dark where they are driven, red where not."""
+    for line, verdict in zip(driven.lines, driven.outcome.verdicts, strict=True):
+        height = driven.process.standoff_m
+        places = line.positions + (height - 0.002) * line.axes
+        places = places @ pose[:3, :3].T + pose[:3, 3]
+        for k in range(len(places) - 1):
+            if scene.ngeom >= scene.maxgeom:
+                return
+            good = verdict[k] == "reached" and verdict[k + 1] == "reached"
+            colour = (0.10, 0.12, 0.20, 1.0) if good else (0.85, 0.10, 0.10, 1.0)
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(
+                geom, mujoco.mjtGeom.mjGEOM_CAPSULE, np.zeros(3), np.zeros(3),
+                np.zeros(9), np.array(colour, np.float32),
+            )  # fmt: skip
+            mujoco.mjv_connector(
+                geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.0016, places[k], places[k + 1]
+            )
+            scene.ngeom += 1

@@ -1,0 +1,186 @@
+"""How well a field can explain a cloud in a hypothesised frame.
+
+Surfaces of a few known members of the category are mapped onto the cloud by the field (C of their
+descriptors and the cloud's embedding). In the right frame they come to lie on it, on the right
+sides; in a wrong one the field puts seats where backs are, off the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from nrdf.errors import ModelError
+from nrdf.field.base import Inverse
+from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
+from nrdf.field.yaw import YawNetwork, find_yaw
+from nrdf.geometry.points import thin
+from nrdf.io.cloud import PointCloud
+from nrdf.regions.association import NORMAL_WEIGHT
+from nrdf.regions.model import Model
+from nrdf.shapes.families import FAMILY_NAMES, get_family
+
+FIRST_SEED = 900_000  # of the members that serve as prototypes; no training set has them
+PROTOTYPES = 8
+_COARSE_POINTS = 128  # of each prototype
+_FINE_POINTS = 256
+_JUDGED_POINTS = 512  # of the cloud
+_COARSE_TOLERANCE, _FINE_TOLERANCE = 0.05, 0.03
+"""Distance at which a point counts half as explained, canonical."""
+_UNSEEN = 0.5  # weight of the prototypes' points: what they lie on may not have been seen
+_DEPTH = 0.02  # how far below and above the surface the field is asked for occupancy, canonical
+_DOUBT, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
+_USUAL_POINTS = 1024
+_LEAST_SPREAD = 0.15  # of the logarithm of proportions
+_BATCH = 36
+
+
+class PoseScorer:
+    """Prototypes of a model's category, their descriptors known."""
+
+    def __init__(
+        self,
+        model: Model,
+        prototypes: Sequence[PointCloud] = (),
+        yaw: YawNetwork | None = None,
+    ) -> None:
+        """`prototypes` are canonical in orientation; members of the category's family unless given.
+        `yaw` tells which way its objects face; the category's in the zoo unless given.
+
+        Raises ModelError if there are none and the category has no family.
+        """
+        self.model = model
+        self.yaw = yaw or find_yaw(model.category)
+        given = list(prototypes) or family_prototypes(model.category)
+        self.prototypes = len(given)
+        self._clouds = [model.embed(cloud) for cloud in given]
+        described = []
+        with torch.inference_mode():
+            for cloud in self._clouds:
+                chosen = thin(cloud.points, _FINE_POINTS, np.random.default_rng(0))
+                chosen = np.random.default_rng(0).permutation(chosen)
+                points = model.tensor(cloud.points[chosen])[None]
+                normals = model.tensor(cloud.normals[chosen])[None]
+                described.append(model.field.describe(cloud.z, points, normals))
+        self._k = torch.cat(described)  # (p, _FINE_POINTS, d_k)
+
+    def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Cost (h,) of h hypotheses: clouds (h, n, 3) in hypothesised canonical frames.
+
+        Mean over the prototypes of the robust distance (Geman and McClure; 0 to 1) from the cloud
+        to the mapped prototype, plus half that of the way back.
+        """
+        parts = []
+        for start in range(0, len(points), _BATCH):
+            part = slice(start, start + _BATCH)
+            q, n = self.model.tensor(points[part]), self.model.tensor(normals[part])
+            parts.append(self._explained(q, n, q, n, _COARSE_POINTS, _COARSE_TOLERANCE)[0].mean(1))
+        return torch.cat(parts).cpu().numpy()
+
+    def fine(
+        self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray
+    ) -> np.ndarray:
+        """Cost (h,) as of `coarse`, more exactly, with what the field doubts.
+
+        whole, whole_normals: (h, m, 3) what is embedded: the cloud, completed by its mirror image
+        where it has one. Added are the error that the field expects of itself on the prototypes,
+        and how far it is from finding matter just below the cloud's points and none above.
+        """
+        return self._fine(points, normals, whole, whole_normals).mean(axis=1)
+
+    def cost_of(self, target: EncodedCloud) -> float:
+        """The cost of a target in the pose in which it is embedded."""
+        return float(self._each_cost(target).mean())
+
+    @cached_property
+    def usual_cost(self) -> float:
+        """The mean cost of each prototype, judged by the others: what is usual in the category."""
+        costs = []
+        for number, cloud in enumerate(self._clouds):
+            each = self._each_cost(cloud)
+            costs.append(np.delete(each, number).mean() if self.prototypes > 1 else each.mean())
+        return float(np.mean(costs))
+
+    def strangeness(self, points: np.ndarray) -> float:
+        """How far the proportions of a canonical cloud (n, 3) are from the prototypes', in standard
+        deviations (root mean square over the axes)."""
+        known = np.array([_proportions(cloud.points) for cloud in self._clouds])
+        spread = np.maximum(known.std(axis=0), _LEAST_SPREAD)
+        return float(np.sqrt(np.mean(((_proportions(points) - known.mean(axis=0)) / spread) ** 2)))
+
+    def _each_cost(self, target: EncodedCloud) -> np.ndarray:
+        """The cost of a target by each of the prototypes, (p,)."""
+        chosen = sparse_subset(target.points, _USUAL_POINTS)
+        points, normals = target.points[None, chosen], target.normals[None, chosen]
+        return self._fine(points, normals, points, normals)[0]
+
+    def _fine(
+        self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray
+    ) -> np.ndarray:
+        """The cost of h hypotheses by each of p prototypes, (h, p)."""
+        q, n, w, wn = (self.model.tensor(part) for part in (points, normals, whole, whole_normals))
+        cost, inverse, z = self._explained(q, n, w, wn, _FINE_POINTS, _FINE_TOLERANCE)
+        with torch.inference_mode():
+            if inverse.log_error is not None:
+                doubt = inverse.log_error.unflatten(1, (self.prototypes, -1))
+                cost = cost + _DOUBT * doubt.mean(2)
+            below = self.model.field.occupancy(z, q - _DEPTH * n)
+            above = self.model.field.occupancy(z, q + _DEPTH * n)
+            wrong = functional.softplus(-below) + functional.softplus(above)
+            return (cost + _INSIDE * wrong.mean(1, keepdim=True)).cpu().numpy()
+
+    def _explained(
+        self, q: Tensor, n: Tensor, w: Tensor, wn: Tensor, count: int, tolerance: float
+    ) -> tuple[Tensor, Inverse, Tensor]:
+        """Cost (h, p) of clouds q, n (h, ., 3), embedded as w, wn; what C said; embeddings."""
+        field, h = self.model.field, len(q)
+        with torch.inference_mode():
+            z = field.embed(w, wn)
+            k = self._k[:, :count].flatten(0, 1)
+            inverse = field.invert(z, k.expand(h, -1, -1))
+            mapped = inverse.points
+            seen = q[:, :_JUDGED_POINTS]
+            if inverse.normals is not None:
+                mapped = torch.cat([mapped, NORMAL_WEIGHT * inverse.normals], dim=-1)
+                seen = torch.cat([seen, NORMAL_WEIGHT * n[:, :_JUDGED_POINTS]], dim=-1)
+            mapped = mapped.unflatten(1, (self.prototypes, count)).flatten(0, 1)
+            seen = seen[:, None].expand(-1, self.prototypes, -1, -1).flatten(0, 1)
+            square = torch.cdist(seen, mapped).square()
+            there, back = (
+                (least / (least + tolerance**2)).mean(1)
+                for least in (square.amin(2), square.amin(1))
+            )
+            return (there + _UNSEEN * back).view(h, -1), inverse, z
+
+
+def sparse_subset(points: np.ndarray, count: int) -> np.ndarray:
+    """Indices (at most `count`,) of points that stand for all, the extreme ones included as far as
+    they fit, in random order."""
+    return np.random.default_rng(0).permutation(encoder_subset(points, count))[:count]
+
+
+def _proportions(points: np.ndarray) -> np.ndarray:
+    """Logarithms (3,) of the bounding box's sides, their mean taken off."""
+    sides = np.log(np.maximum(np.ptp(points, axis=0), 1e-3))
+    return sides - sides.mean()
+
+
+def family_prototypes(category: str) -> list[PointCloud]:
+    """Members of a category's family that no training set holds. Raises ModelError without one."""
+    if category not in FAMILY_NAMES:
+        raise ModelError(
+            f"the category '{category}' has no parametric family (there are "
+            f"{', '.join(FAMILY_NAMES)}), so alignment needs an example: give a --reference"
+        )
+    family = get_family(category)
+    rng = np.random.default_rng(0)
+    found = []
+    for seed in range(FIRST_SEED, FIRST_SEED + PROTOTYPES):
+        surface = family.member(seed).sample_surface(2048, rng)
+        found.append(PointCloud(surface.points, surface.normals))
+    return found

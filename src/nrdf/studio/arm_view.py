@@ -1,0 +1,103 @@
+"""An arm on the stage, at work on one object."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+from scipy.spatial.transform import Rotation
+
+from nrdf.geometry.similarity import about_up
+from nrdf.studio.playback import EVERY_PATH, FLOOR, Playback
+from nrdf.studio.scene_view import Figure
+
+_CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""From the cell's frame, z up, to the stage's directions, y up, the object's x staying x."""
+_MISSED = (215, 20, 20)
+_MISSED_SIZE = 1.2  # of a point that is not reached, in spacings
+_ROOM_M = (-0.08, 0.08)  # around the arm's frames, for its thickness
+_EVERY = 25  # moments between those that a camera is placed by
+
+
+class Rig:
+    """The arm, its tool and what they stand on; the object turns with its turntable."""
+
+    def __init__(self, figure: Figure, playback: Playback) -> None:
+        self.figure, self.playback = figure, playback
+        self._factor = figure.stage.factor
+        self._scene = figure.stage.server.scene
+        wxyz = np.roll(Rotation.from_matrix(_CELL).as_quat(), 1)
+        self._root = self._scene.add_frame("/arm", show_axes=False, wxyz=wxyz)
+        self._bodies: dict[int, viser.FrameHandle] = {}
+        self._tools: dict[int, list[viser.MeshHandle]] = {}
+        for number, shape in enumerate(playback.shapes):
+            parent = "/arm" if shape.body == FLOOR else self._body(shape.body)
+            mesh = self._scene.add_mesh_simple(
+                f"{parent}/shape{number}",
+                shape.vertices * self._factor,
+                shape.faces,
+                color=shape.colour,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            if shape.path != EVERY_PATH:
+                self._tools.setdefault(shape.path, []).append(mesh)
+        body = figure.body
+        self._marks = self._scene.add_point_cloud(
+            f"{figure.path}/missed",
+            (playback.missed * self._factor).astype(np.float32),
+            np.full((len(playback.missed), 3), _MISSED, np.uint8),
+            point_size=_MISSED_SIZE * body.surface.spacing * self._factor,
+            point_shape="circle",
+            precision="float32",
+        )
+        self._at = -1
+        self.stand(figure.offset)
+
+    @property
+    def places(self) -> np.ndarray:
+        """Places (k, 3) in the scene that the arm takes up at work, its base's foot included."""
+        playback = self.playback
+        at_work = playback.positions[playback.doing == "process"][::_EVERY].reshape(-1, 3)
+        around = np.array([[x, y, z] for x in _ROOM_M for y in _ROOM_M for z in _ROOM_M])
+        foot = playback.positions[0, 0] * [1.0, 1.0, 0.0]
+        taken = np.concatenate([(at_work[:, None] + around).reshape(-1, 3), [foot]])
+        return taken @ _CELL.T * self._factor + self._origin
+
+    def stand(self, offset: np.ndarray) -> None:
+        """Stand where the object, not turned, is at `offset` (3,) in the scene."""
+        place = _CELL @ self.playback.T_cell_object[:3, 3] * self._factor
+        self._object, self._origin = place, offset - place
+        self._upright = _CELL @ self.playback.T_cell_object[:3, :3]
+        self._root.position = tuple(self._origin)
+        self.show(max(self._at, 0))
+
+    def show(self, at: int) -> None:
+        """Show the moment of that index."""
+        playback = self.playback
+        angle = float(playback.turn_rad[at])
+        # The turntable's axis goes through the cell's origin.
+        turn = about_up(angle)
+        self.figure.stand(self._origin + turn @ self._object, turn @ self._upright)
+        for body, frame in self._bodies.items():
+            frame.position = tuple(playback.positions[at, body] * self._factor)
+            frame.wxyz = tuple(playback.quaternions_wxyz[at, body])
+        for path, tools in self._tools.items():
+            for mesh in tools:
+                mesh.visible = path == playback.path[at]
+        self._at = at
+
+    def see(self, visible: bool) -> None:
+        """Show or hide all but the object."""
+        self._root.visible = self._marks.visible = visible
+
+    def remove(self) -> None:
+        """Take the arm away, and let the object stand as it does without one."""
+        self.figure.stand(self._origin + self._object)
+        self._root.remove()
+        self._marks.remove()
+
+    def _body(self, number: int) -> str:
+        name = f"/arm/body{number}"
+        if number not in self._bodies:
+            self._bodies[number] = self._scene.add_frame(name, show_axes=False)
+        return name

@@ -1,0 +1,248 @@
+"""What a person can do with a session, whatever shows it: load, paint, describe, correct."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from nrdf.errors import NrdfError, RegionError
+from nrdf.io.cloud import PointCloud
+from nrdf.io.names import usable_file_name
+from nrdf.process.bound_knowledge import BoundKnowledge, overlaps
+from nrdf.regions.region import region_name_fault
+from nrdf.studio.colours import next_colour
+from nrdf.studio.document import REFERENCE, Document, Painted, Target
+from nrdf.studio.paintable_cloud import Body
+from nrdf.studio.session import Session
+from nrdf.studio.teaching import changed_step, new_step, painted_of
+from nrdf.studio.uploads import shown_name, to_paint_on
+
+_FIRST_KIND = "sand"
+
+
+class Desk:
+    """A session, its objects ready to be painted on, and every change that can be made to it.
+
+    Raises what `Session` raises.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self._bodies: dict[str, tuple[PointCloud, Body]] = {}
+
+    @property
+    def document(self) -> Document:
+        """What has been made so far."""
+        return self.session.document
+
+    def body(self, key: str) -> Body:
+        """The reference, or the target of that name."""
+        cloud = self._cloud(key)
+        kept = self._bodies.get(key)
+        if kept is None or kept[0] is not cloud:
+            kept = self._bodies[key] = (cloud, Body(cloud))
+        return kept[1]
+
+    def objects(self) -> list[str]:
+        """The objects that there are."""
+        document = self.document
+        first = [] if document.reference is None else [REFERENCE]
+        return first + [target.object.name for target in document.targets]
+
+    def target(self, key: str) -> Target | None:
+        """The target of that name, None for the reference."""
+        return next((t for t in self.document.targets if t.object.name == key), None)
+
+    # --- objects
+
+    def open_reference(self, name: str, cloud: PointCloud, category: str) -> None:
+        """Begin with a reference, in metres; regions and targets of an earlier one go."""
+        loaded = self.session.store(shown_name(name), to_paint_on(cloud))
+        self.session.change(Document(category, loaded))
+
+    def open_lesson(self, name: str, lesson: BoundKnowledge) -> None:
+        """Begin with what a knowledge file teaches, on its reference."""
+        small = to_paint_on(lesson.cloud)
+        if len(small) < len(lesson.cloud):
+            raise RegionError(
+                f"the reference has {len(lesson.cloud)} points; knowledge with more than "
+                f"{len(small)} is for the command line"
+            )
+        loaded = self.session.store(shown_name(name), lesson.cloud)
+        colours: dict[str, tuple[int, int, int]] = {}
+        for region in lesson.knowledge.regions:
+            colours[region.name] = next_colour(list(colours.values()))
+        knowledge = lesson.knowledge
+        regions = painted_of(lesson, colours)
+        self.session.change(
+            Document(knowledge.category, loaded, regions, (), knowledge.allow_overlap)
+        )
+
+    def start_anew(self) -> None:
+        """Put everything away; undoing brings it back."""
+        self.session.change(Document(self.document.category))
+
+    def add_target(self, name: str, cloud: PointCloud) -> str:
+        """Put an object, in metres, beside the others; the name that it got."""
+        taken = [REFERENCE, *(t.object.name for t in self.document.targets)]
+        name = _free(usable_file_name(PurePath(shown_name(name)).stem, "target"), taken)
+        target = Target(self.session.store(name, cloud))
+        document = self.document
+        self.session.change(replace(document, targets=(*document.targets, target)))
+        return name
+
+    def remove_target(self, key: str) -> None:
+        """Take a target away."""
+        left = tuple(t for t in self.document.targets if t.object.name != key)
+        self.session.change(replace(self.document, targets=left))
+
+    # --- regions
+
+    def add_region(self, name: str = "") -> str:
+        """A new region without points, with a process to begin with; its name."""
+        document = self.document
+        taken = [region.name for region in document.regions]
+        name = _free(name or "region", taken, always=not name)
+        colour = next_colour([region.colour for region in document.regions])
+        mask = np.zeros(len(self.body(REFERENCE).cloud), bool)
+        added = Painted(name, colour, mask, (new_step(_FIRST_KIND),))
+        self.session.change(replace(document, regions=(*document.regions, added)))
+        return name
+
+    def rename_region(self, old: str, new: str) -> None:
+        """Raises RegionError for a name that is taken, or cannot be a file's name."""
+        new = new.strip()
+        if new == old:
+            return
+        if fault := region_name_fault(new):
+            raise RegionError(f"'{new}' is no name for a region: {fault}")
+        if self.document.region(new) is not None:
+            raise RegionError(f"there is a region '{new}' already; give another name")
+        document = self.document.with_region(old, called=new)
+        for target in document.targets:
+            corrected = {new if n == old else n: m for n, m in target.corrected.items()}
+            document = document.with_target(target.object.name, corrected=corrected)
+        self.session.change(document)
+
+    def recolour_region(self, name: str, colour: tuple[int, int, int]) -> None:
+        """Another colour, red, green, blue, 0 to 255."""
+        self.session.change(self.document.with_region(name, colour=colour))
+
+    def remove_region(self, name: str) -> None:
+        """Take a region, and what is done to it, away."""
+        document = self.document
+        left = tuple(region for region in document.regions if region.name != name)
+        document = replace(document, regions=left)
+        for target in document.targets:
+            corrected = {n: m for n, m in target.corrected.items() if n != name}
+            document = document.with_target(target.object.name, corrected=corrected)
+        self.session.change(document)
+
+    # --- painting
+
+    def mask(self, key: str, region: str, found: np.ndarray | None = None) -> np.ndarray:
+        """The shown points (k,) of an object that are in a region: as painted or corrected, or as
+        `found`, indices of a target's points."""
+        body, target = self.body(key), self.target(key)
+        if target is None:
+            painted = self.document.region(region)
+            whole = np.zeros(len(body.cloud), bool) if painted is None else painted.mask
+        elif region in target.corrected:
+            whole = target.corrected[region]
+        else:
+            whole = np.zeros(len(body.cloud), bool)
+            whole[[] if found is None else found] = True
+        return body.to_shown(whole)
+
+    def paint(self, key: str, region: str, mask: np.ndarray, merge: bool = False) -> None:
+        """Let a region be these shown points (k,): on the reference, or on a target by hand."""
+        body, target = self.body(key), self.target(key)
+        whole = body.to_all(mask)
+        if target is None:
+            document = self.document.with_region(region, mask=whole)
+        else:
+            document = self.document.with_target(key, corrected={**target.corrected, region: whole})
+        self.session.change(document, merge)
+
+    def forget_corrections(self, key: str) -> None:
+        """Let a target's regions be what is found again."""
+        self.session.change(self.document.with_target(key, corrected={}))
+
+    def allow_overlap(self, allowed: bool) -> None:
+        """Whether regions may have points in common."""
+        self.session.change(replace(self.document, allow_overlap=allowed))
+
+    def shared(self) -> list[str]:
+        """A line for each two regions that overlap by more than their borders."""
+        regions = {r.name: np.flatnonzero(r.mask) for r in self.document.regions if r.mask.any()}
+        return overlaps(regions)
+
+    # --- processes
+
+    def change_step(self, region: str, number: int, **content: Any) -> None:
+        """Set fields of a step, SI; None takes a field away."""
+        step = {**self._step(region, number), **content}
+        self._set_step(region, number, {k: v for k, v in step.items() if v is not None})
+
+    def change_numbers(self, region: str, number: int, shown: Mapping[str, float]) -> None:
+        """Set numbers of a step as the page shows them."""
+        self._set_step(region, number, changed_step(self._step(region, number), shown))
+
+    def restart_step(self, region: str, number: int, kind: str) -> None:
+        """Another kind of process, with the values that it begins with."""
+        self._set_step(region, number, new_step(kind))
+
+    def add_step(self, region: str, kind: str) -> int:
+        """One more process on a region, after the others; its number."""
+        painted = self._painted(region)
+        steps = (*painted.steps, new_step(kind))
+        self.session.change(self.document.with_region(region, steps=steps))
+        return len(steps) - 1
+
+    def remove_step(self, region: str, number: int) -> None:
+        """Raises RegionError for the last one: a region needs a process."""
+        steps = self._painted(region).steps
+        if len(steps) < 2:
+            raise RegionError(f"region '{region}' needs at least one process; change this one")
+        left = tuple(step for i, step in enumerate(steps) if i != number)
+        self.session.change(self.document.with_region(region, steps=left))
+
+    def _set_step(self, region: str, number: int, content: Mapping[str, Any]) -> None:
+        steps = list(self._painted(region).steps)
+        if content == steps[number]:
+            return
+        steps[number] = content
+        self.session.change(self.document.with_region(region, steps=tuple(steps)))
+
+    def _step(self, region: str, number: int) -> Mapping[str, Any]:
+        return self._painted(region).steps[number]
+
+    def _painted(self, name: str) -> Painted:
+        painted = self.document.region(name)
+        if painted is None:
+            raise RegionError("there is no region yet: make one in step 2")
+        return painted
+
+    def _cloud(self, key: str) -> PointCloud:
+        target, reference = self.target(key), self.document.reference
+        if target is not None:
+            return target.object.cloud
+        if key != REFERENCE or reference is None:
+            raise NrdfError("there is no reference yet: load one in step 1")
+        return reference.cloud
+
+
+def _free(name: str, taken: list[str], always: bool = False) -> str:
+    """The name, with a number where it is taken, or always."""
+    name = re.sub(r"[^\w .+-]", "-", name)[:80]
+    if not always and name not in taken:
+        return name
+    number = 1 if always else 2
+    while f"{name}-{number}" in taken:
+        number += 1
+    return f"{name}-{number}"

@@ -1,0 +1,56 @@
+"""An object as it is shown and painted on: the points a model works with, and their surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.geometry.points import estimate_normals, thin
+from nrdf.io.cloud import PointCloud
+from nrdf.regions.model import WORKING_POINTS
+from nrdf.studio.painting import Canvas
+from nrdf.surface.given_surface import GivenSurface, given_surface
+from nrdf.surface.surface import Surface
+
+
+class Body:
+    """An object to be shown and painted on.
+
+    cloud: (n,) points, m. points, normals: (k, 3) of those that are shown, `shown` (k,) their
+    indices: what a model works with.
+    """
+
+    def __init__(self, cloud: PointCloud) -> None:
+        self.cloud = cloud
+        self.shown = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        self.points = cloud.points[self.shown]
+        given = cloud.normals
+        self.normals = estimate_normals(self.points) if given is None else given[self.shown]
+        self.surface = Surface(self.points, self.normals)
+        self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
+
+    @cached_property
+    def canvas(self) -> Canvas:
+        """The shown points, to be painted on."""
+        return Canvas(self.surface)
+
+    @cached_property
+    def given(self) -> GivenSurface:
+        """The object as it was given, to judge tool paths by."""
+        normals = self.normals[self._follows] if self.cloud.normals is None else self.cloud.normals
+        return given_surface(replace(self.cloud, normals=normals))
+
+    @cached_property
+    def _follows(self) -> np.ndarray:
+        return np.asarray(cKDTree(self.points).query(self.cloud.points)[1])
+
+    def to_all(self, mask: np.ndarray) -> np.ndarray:
+        """A mask of the shown points (k,) as one of all points (n,): each follows its nearest."""
+        return mask if len(self.shown) == len(self.cloud) else mask[self._follows]
+
+    def to_shown(self, values: np.ndarray) -> np.ndarray:
+        """Values of all points (n, ...) as those of the shown ones (k, ...)."""
+        return values[self.shown]

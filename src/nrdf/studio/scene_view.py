@@ -1,0 +1,253 @@
+"""The objects in the browser: side by side on one floor, under one camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+import viser
+from scipy.spatial.transform import Rotation
+
+from nrdf.studio.paintable_cloud import Body
+from nrdf.studio.view import View, hit
+from nrdf.surface.surface import unit
+
+FOV_RAD = np.radians(48.0)
+_FROM = np.array([0.86, 0.52, 0.34])
+"""Where the camera stands, seen from the objects: before them, above, to their right."""
+_FROM_BESIDE = np.array([0.42, 0.36, 0.83])
+"""The same where an arm stands before the object."""
+_ROOM = 1.06  # times the distance at which all is just seen
+_ABOVE = 0.14  # of the label above the object, in the scene
+_GAP = 0.25  # between objects, in sides of the largest
+_SIZE = 1.38  # of a point, in spacings
+_LIFT = 1.4  # of lines above the surface, in spacings
+_LIGHT = np.array([0.62, 0.70, 0.35])
+"""Where the light comes from: front, above, right."""
+_DARKEST = 0.58  # share of its colour that a point has whose side faces away from the light
+
+
+class Figure:
+    """A body on the stage: where it stands, and what is drawn of it."""
+
+    def __init__(self, stage: Stage, key: str, number: int, body: Body) -> None:
+        self.key, self.body, self.stage = key, body, stage
+        self.path = f"/object{number}"
+        self.offset, self._rotation = np.zeros(3), np.eye(3)
+        scene = stage.server.scene
+        self.frame = scene.add_frame(self.path, show_axes=False)
+        self.points = scene.add_point_cloud(
+            f"{self.path}/points",
+            (body.points * stage.factor).astype(np.float32),
+            np.full((len(body.points), 3), 200, np.uint8),
+            point_size=_SIZE * body.surface.spacing * stage.factor,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+        size = (body.high - body.low) * stage.factor
+        # Nothing to see: what a drag that paints must begin on. Only lines, for slow renderers.
+        self.ground = scene.add_box(
+            f"{self.path}/ground",
+            dimensions=tuple(1.02 * size),
+            position=tuple((body.low + body.high) / 2 * stage.factor),
+            wireframe=True,
+            flat_shading=False,
+            opacity=0.0,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self.label = scene.add_label(
+            f"{self.path}/label",
+            key,
+            position=tuple(self.top * stage.factor + np.array([0.0, _ABOVE, 0.0])),
+            anchor="bottom-center",
+        )
+        self._lines: list[viser.SceneNodeHandle] = []
+        self._arrows: dict[str, viser.SceneNodeHandle] = {}
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The corners (8, 3) of the object's bounding box in the scene, room for the label above
+        included."""
+        low, high = self.body.low * self.stage.factor, self.body.high * self.stage.factor
+        high[1] += _ABOVE
+        choice = np.array(list(product((False, True), repeat=3)))
+        return np.where(choice, high, low) @ self._rotation.T + self.offset
+
+    @property
+    def top(self) -> np.ndarray:
+        """The place (3,) over the object's middle, at its highest, m."""
+        middle = (self.body.low + self.body.high) / 2
+        return np.array([middle[0], self.body.high[1], middle[2]])
+
+    def stand(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
+        """Move the object; offset (3,) in the scene, rotation (3, 3) from its own frame."""
+        self.offset, self._rotation = offset, np.eye(3) if rotation is None else rotation
+        self.frame.position = tuple(offset)
+        self.frame.wxyz = tuple(np.roll(Rotation.from_matrix(self._rotation).as_quat(), 1))
+
+    def paint(self, colours: np.ndarray) -> None:
+        """Colours (k, 3) uint8 of the shown points, which are shaded here."""
+        facing = 0.5 + 0.5 * self.body.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
+        shade = _DARKEST + (1 - _DARKEST) * facing
+        self.points.colors = (colours * shade[:, None]).astype(np.uint8)
+
+    def let_drag(self, dragged: Callable[..., Any] | None) -> None:
+        """Who is told of drags that begin on the object; the camera, where None is."""
+        if (dragged is not None) == self.ground.visible:
+            return
+        self.ground.visible = dragged is not None
+        if dragged is None:
+            self.ground.remove_drag_callback()
+        else:
+            self.ground.on_drag(dragged)
+
+    def name(self, text: str) -> None:
+        """What stands above the object."""
+        self.label.text = text
+
+    def draw_lines(self, lines: Mapping[str, tuple[Sequence[np.ndarray], np.ndarray]]) -> None:
+        """Lines by name, each (arrays (m, 3), m; colour (3,)), in place of all earlier ones."""
+        scene, factor = self.stage.server.scene, self.stage.factor
+        for handle in self._lines:
+            handle.remove()
+        self._lines.clear()
+        for number, (parts, colour) in enumerate(lines.values()):
+            drawn = [self._lifted(part) for part in parts if len(part) > 1]
+            if not drawn:
+                continue
+            pairs = [np.stack([part[:-1], part[1:]], axis=1) for part in drawn]
+            handle = scene.add_line_segments(
+                f"{self.path}/line{number}",
+                np.concatenate(pairs) * factor,
+                np.asarray(colour, np.uint8),
+                thickness=2.5,
+                thickness_units="screen",
+            )
+            self._lines.append(handle)
+
+    def draw_arrow(self, name: str, start: np.ndarray | None, stop: np.ndarray | None) -> None:
+        """An arrow from one place (3,) to another, m, or none."""
+        if name in self._arrows:
+            self._arrows.pop(name).remove()
+        if start is None or stop is None or np.linalg.norm(stop - start) < 1e-6:
+            return
+        factor = self.stage.factor
+        lift = 2 * self.body.surface.spacing
+        ends = np.array([[start, stop]])
+        at = int(np.argmin(np.linalg.norm(self.body.points - start, axis=1)))
+        self._arrows[name] = self.stage.server.scene.add_arrows(
+            f"{self.path}/{name}",
+            (ends + lift * self.body.normals[at]) * factor,
+            (20, 20, 24),
+            shaft_radius=0.008,
+            head_radius=0.022,
+            head_length=0.05,
+        )
+
+    def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[int, float] | None:
+        """The shown point that a ray of the scene meets first, and the depth in the scene."""
+        found = hit(
+            self.body.points,
+            self.body.normals,
+            (origin - self.offset) @ self._rotation / self.stage.factor,
+            direction @ self._rotation,
+            self.body.surface.spacing,
+        )
+        return None if found is None else (found[0], found[1] * self.stage.factor)
+
+    def view(self, view: View) -> View:
+        """A camera of the scene as the object sees it, m."""
+        position = (view.position - self.offset) @ self._rotation / self.stage.factor
+        return View(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
+
+    def remove(self) -> None:
+        """Take the object and all that is drawn of it away."""
+        self.frame.remove()
+
+    def _lifted(self, line: np.ndarray) -> np.ndarray:
+        near = self.body.surface.tree.query(line)[1]
+        return line + _LIFT * self.body.surface.spacing * self.body.surface.normals[near]
+
+
+class Stage:
+    """All objects. factor: scene units for a metre, such that the reference is about 1 long."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.server = server
+        self.figures: dict[str, Figure] = {}
+        self.factor = 1.0
+        self._made = 0
+        server.scene.set_up_direction("+y")
+        server.initial_camera.fov = FOV_RAD
+
+    def clear(self, factor: float) -> None:
+        """Take everything away."""
+        for figure in self.figures.values():
+            figure.remove()
+        self.figures.clear()
+        self.factor = factor
+
+    def add(self, key: str, body: Body) -> Figure:
+        """Put an object beside the others."""
+        self._made += 1
+        figure = Figure(self, key, self._made, body)
+        self.figures[key] = figure
+        return figure
+
+    def remove(self, key: str) -> None:
+        """Take an object away."""
+        self.figures.pop(key).remove()
+
+    def arrange(self, shown: Sequence[str]) -> None:
+        """Let the objects `shown` stand in a row, to the right of each other as seen from the
+        front, and hide the others."""
+        bodies = [figure.body for figure in self.figures.values()]
+        if not bodies:
+            return
+        gap = _GAP * max(float((b.high - b.low).max()) for b in bodies) * self.factor
+        right = 0.0
+        for key, figure in self.figures.items():
+            figure.frame.visible = key in shown
+            if key not in shown:
+                continue
+            body = figure.body
+            low, high = body.low * self.factor, body.high * self.factor
+            # +Z is the object's right-hand side: to the left of who stands before it.
+            figure.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
+            right -= high[2] - low[2] + gap
+
+    def camera(
+        self, shown: Sequence[str], aspect: float, beside: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where a camera with that width over height stands to see the objects `shown` from the
+        front, or with places (k, 3) beside them from their right, and what it looks at."""
+        figures = [figure for key, figure in self.figures.items() if key in shown]
+        more = np.zeros((0, 3)) if beside is None else beside
+        corners = np.concatenate([more, *(figure.corners for figure in figures)])
+        if not len(corners):
+            corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        toward = unit(_FROM if beside is None else _FROM_BESIDE)
+        right = unit(np.cross([0.0, 1.0, 0.0], toward))
+        axes = np.stack([right, np.cross(toward, right), toward])
+        seen = (corners - middle) @ axes.T
+        half = np.tan(FOV_RAD / 2) * np.array([aspect, 1.0])
+        away = float((np.abs(seen[:, :2]) / half + seen[:, 2:]).max())
+        return middle + _ROOM * away * toward, middle
+
+    def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[Figure, int] | None:
+        """The object and its shown point that a ray meets first."""
+        met = [
+            (found[1], figure, found[0])
+            for figure in self.figures.values()
+            if figure.frame.visible and (found := figure.hit(origin, direction)) is not None
+        ]
+        if not met:
+            return None
+        _, figure, index = min(met, key=lambda entry: entry[0])
+        return figure, index

@@ -1,0 +1,251 @@
+"""How well a tool path works its region: the figures of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from nrdf.errors import ProcessError
+from nrdf.surface.accessibility import with_room
+from nrdf.surface.given_surface import GivenSurface
+from nrdf.surface.patch import Patch, inside_margin, patches_of
+from nrdf.surface.surface import Surface
+from nrdf.toolpath.frames import lean_rotation, surface_frames, travel_of
+from nrdf.toolpath.planner import Strategy
+from nrdf.toolpath.sampled_path import Track, line_spacing
+from nrdf.toolpath.types import Segment
+
+_SHORTEST_M = 1e-3
+_JUDGED_M = 0.003  # between the places that are compared with the object as given
+
+NO_ROOM, MARGIN = "no_room", "edge_margin"
+REASONS = {NO_ROOM: "no room for the tool", MARGIN: "edge margin"}
+"""Why a part of a region is left out, in words."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What becomes of a whole region, in shares [0, 1] of its points that add up to 1.
+
+    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_room, where less than the
+    tool's clearance is free before the surface, whether the footprint brushes it or not, and
+    edge_margin, inside it and not reached. unreached: it should be worked, and is not.
+    """
+
+    worked: float
+    left_out: dict[str, float]
+    unreached: float
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A region as a strategy wants it worked. points: (k,) indices of the surface's points, all of
+    them; free (k,): those with room for the tool; inside (k,): those that are not in the margin."""
+
+    points: np.ndarray
+    free: np.ndarray
+    inside: np.ndarray
+    patches: tuple[Patch, ...]
+
+    @staticmethod
+    def of(
+        surface: Surface, region: np.ndarray, clearance_m: float, edge_margin_m: float
+    ) -> Wanted:
+        """region: indices (k,) of the surface's points. Raises ProcessError as planning does."""
+        points = surface.indices(region)
+        room = with_room(surface, region, clearance_m)
+        patches = patches_of(surface, room)
+        inside = inside_margin(surface, room, patches, edge_margin_m)
+        free = np.isin(points, surface.indices(room))
+        return Wanted(points, free, np.isin(points, inside), patches)
+
+    def coverage(self, reached: np.ndarray) -> Coverage:
+        """The shares, where a footprint reaches (k,) of the points."""
+        worked, margin = self.free & reached, self.free & ~self.inside & ~reached
+        left_out = {NO_ROOM: float((~self.free).mean()), MARGIN: float(margin.mean())}
+        missed = self.free & self.inside & ~reached
+        return Coverage(float(worked.mean()), left_out, float(missed.mean()))
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Figures of one tool path on one region.
+
+    coverage, left_out, unreached: shares of the whole region that was found, as a `Coverage` has
+    them; overlap: share of what is worked that is reached more than once in a pass;
+    line_spacing_*: between neighbouring lines, along the surface; None where no line has a
+    neighbour.
+
+    surface_distance_*: of the process waypoints from the smooth surface that they were planned on,
+    at the stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on
+    the surface that are worked, along the lines and between waypoints too, from the object as it
+    was given (`nrdf.surface.given_surface`), which judged_by names; less than resolution_m it
+    cannot tell. None where it is not known.
+
+    axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
+    step_worst_m, turn_worst_rad, bend_worst_rad_m: the largest step between neighbouring waypoints
+    of a process segment, of the tool centre point or of the place that it works, whichever is
+    larger; the largest turn of the tool's axis between them; and the largest turn by length of the
+    step, where steps of less than 1 mm count as 1 mm.
+
+    process_length_m: of the process segments; path_length_m: of all, free moves between them
+    included; cycle_time_s: at the feeds given, dwells included.
+    """
+
+    coverage: float
+    left_out: dict[str, float]
+    unreached: float
+    overlap: float
+    line_spacing_mean_m: float | None
+    line_spacing_worst_m: float | None
+    surface_distance_worst_m: float
+    surface_distance_99_m: float
+    axis_error_99_rad: float
+    step_worst_m: float
+    turn_worst_rad: float
+    bend_worst_rad_m: float
+    path_length_m: float
+    process_length_m: float
+    cycle_time_s: float
+    judged_by: str | None = None
+    resolution_m: float | None = None
+    true_distance_worst_m: float | None = None
+    true_distance_99_m: float | None = None
+    true_distance_95_m: float | None = None
+
+
+def measure(
+    surface: Surface,
+    region: np.ndarray,
+    strategy: Strategy,
+    segments: Sequence[Segment],
+    given: GivenSurface | None = None,
+) -> Measures:
+    """Figures of `segments` on `region`, indices (k,) of the surface's points.
+
+    The region's points, each of which stands for the same area, tell what is covered. given: the
+    object itself, to be judged by. Raises ProcessError if there is no process segment.
+    """
+    work = [segment for segment in segments if segment.kind == "process"]
+    if not work:
+        raise ProcessError("a tool path without a process segment cannot be measured")
+    wanted = Wanted.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
+    axes = [_axes(segment) for segment in work]
+    contacts = [
+        s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
+    ]
+    once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
+    track = Track.along(
+        contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
+    )
+    points, normals = surface.points[wanted.points], surface.normals[wanted.points]
+    visits = track.visits(points, normals, strategy.tool_radius_m)
+    worked = visits[(visits > 0) & wanted.free]
+    spacing = line_spacing(wanted.patches, track, strategy.stepover_m).distance
+    off, wrong = _fit(surface, strategy, work, contacts)
+    step, turn, bend = _jumps(work, contacts, axes)
+    process, between, time = _driven(segments, strategy.approach_feed_m_s)
+    shares = wanted.coverage(visits > 0)
+    made = Measures(
+        coverage=shares.worked,
+        left_out=shares.left_out,
+        unreached=shares.unreached,
+        overlap=float((worked > 1).mean()) if len(worked) else 0.0,
+        line_spacing_mean_m=float(spacing.mean()) if len(spacing) else None,
+        line_spacing_worst_m=float(spacing.max()) if len(spacing) else None,
+        surface_distance_worst_m=float(off.max()),
+        surface_distance_99_m=float(np.quantile(off, 0.99)),
+        axis_error_99_rad=float(np.quantile(wrong, 0.99)),
+        step_worst_m=step,
+        turn_worst_rad=turn,
+        bend_worst_rad_m=bend,
+        path_length_m=process + between,
+        process_length_m=process,
+        cycle_time_s=time,
+    )
+    if given is None:
+        return made
+    fine = Track.along(contacts[:once], axes[:once], _JUDGED_M, 0.0)
+    away = given.distance(fine.places, fine.axes)
+    return replace(
+        made,
+        judged_by=given.name,
+        resolution_m=given.resolution_m,
+        true_distance_worst_m=float(away.max()),
+        true_distance_99_m=float(np.quantile(away, 0.99)),
+        true_distance_95_m=float(np.quantile(away, 0.95)),
+    )
+
+
+def _jumps(
+    work: Sequence[Segment], contacts: Sequence[np.ndarray], axes: Sequence[np.ndarray]
+) -> tuple[float, float, float]:
+    """The largest step (m), turn of the axis (rad) and turn by length (rad/m) of any segment."""
+    step, turn, bend = 0.0, 0.0, 0.0
+    for segment, line, axis in zip(work, contacts, axes, strict=True):
+        if len(line) < 2:
+            continue
+        far = np.maximum(_steps(segment.positions), _steps(line))
+        # Twice the arctangent of the chords' ratio: exact for small angles too.
+        apart = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+        together = np.linalg.norm(axis[1:] + axis[:-1], axis=1)
+        turned = 2.0 * np.arctan2(apart, together)
+        step, turn = max(step, float(far.max())), max(turn, float(turned.max()))
+        bend = max(bend, float((turned / np.maximum(far, _SHORTEST_M)).max()))
+    return step, turn, bend
+
+
+def _steps(line: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(line, axis=0), axis=1)
+
+
+def _axes(segment: Segment) -> np.ndarray:
+    """Tool z (n, 3) of a segment."""
+    return Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
+
+
+def _fit(
+    surface: Surface,
+    strategy: Strategy,
+    work: Sequence[Segment],
+    contacts: Sequence[np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of every waypoint, the distance (n,), m, from the smooth surface that faces the tool, and
+    the angle (n,), rad, between tool z and what the strategy asks for on smooth normals."""
+    everywhere = np.concatenate(contacts)
+    held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
+    lean = lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    tails = -(held * lean.inv()).as_matrix()[:, :, 2]
+    _, _, off = surface.nearest(everywhere, tails)
+    off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
+    smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
+    asked = []
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    for line, normals in zip(contacts, np.split(smooth, cuts), strict=True):
+        # A waypoint alone has no travel; for a tool that does not lean, any will do.
+        travel = travel_of(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
+        asked.append(surface_frames(travel, normals))
+    axes = (Rotation.from_matrix(np.concatenate(asked)) * lean).as_matrix()[:, :, 2]
+    cosine = np.einsum("na,na->n", axes, held.as_matrix()[:, :, 2])
+    return off, np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float, float]:
+    """Length of process segments, length of everything else, time of all."""
+    process, between, time = 0.0, 0.0, 0.0
+    end = None
+    for segment in segments:
+        if end is not None:
+            free = float(np.linalg.norm(segment.positions[0] - end))
+            between, time = between + free, time + free / free_feed
+        length = float(np.linalg.norm(np.diff(segment.positions, axis=0), axis=1).sum())
+        time += length / segment.feed_m_s + segment.dwell_s
+        if segment.kind == "process":
+            process += length
+        else:
+            between += length
+        end = segment.positions[-1]
+    return process, between, time

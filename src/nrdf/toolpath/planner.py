@@ -1,0 +1,278 @@
+"""From a taught strategy and a region of a surface to the segments that a robot drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from nrdf.errors import ProcessError, unknown_name
+from nrdf.surface.accessibility import with_room
+from nrdf.surface.patch import Patch, inside_margin, patches_of
+from nrdf.surface.surface import Surface
+from nrdf.toolpath.contour import contour, spiral
+from nrdf.toolpath.effort import check_effort, check_passes
+from nrdf.toolpath.frames import lean_rotation, steady, surface_frames, travel_of
+from nrdf.toolpath.gap_filling import fill_gaps, touch_up
+from nrdf.toolpath.raster import Stroke, raster
+from nrdf.toolpath.sampled_path import line_spacing, track_of
+from nrdf.toolpath.surface_path import Line, nearest_first, on_surface
+from nrdf.toolpath.types import Segment
+
+Trajectory = Literal["raster", "cross-hatch", "spiral", "contour"]
+TRAJECTORIES: tuple[Trajectory, ...] = ("raster", "cross-hatch", "spiral", "contour")
+LEAST_IN_SURFACE = 0.2
+"""A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_LEAST, _MOST = 1e-9, 1e6  # of every quantity: beyond, sums and squares are no longer numbers
+_TRIES, _WIDE = 3, 1.1  # of lines that are more stepovers apart
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """How a region is worked: SI throughout.
+
+    direction: (3,) main direction of the raster's lines in the surface's frame, projected to the
+    surface; None for the region's longest extent. stepover_m: between neighbouring lines, along
+    the surface; spacing_m: between waypoints, about; edge_margin_m: waypoints keep that far inside
+    the region's border, and the footprint may reach over; tool_radius_m: of the footprint.
+    clearance_m: that much must be free before the surface, along its normal, where it is worked.
+    lead_rad: leans the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
+    the normal. standoff_m: from the tool centre point to the surface along the tool's axis.
+    passes: the lines are driven that often, back and forth. Approach and retract: length of the
+    free moves before and after a line, their angle from the normal (0: along the normal; pi/2:
+    along the line), and their feed.
+    """
+
+    trajectory: Trajectory = "raster"
+    direction: np.ndarray | None = None
+    stepover_m: float = 0.02
+    spacing_m: float = 0.01
+    edge_margin_m: float = 0.0
+    tool_radius_m: float = 0.025
+    clearance_m: float = 0.0
+    lead_rad: float = 0.0
+    tilt_rad: float = 0.0
+    standoff_m: float = 0.0
+    passes: int = 1
+    feed_m_s: float = 0.1
+    force_n: float | None = None
+    dwell_s: float = 0.0
+    approach_distance_m: float = 0.05
+    approach_angle_rad: float = 0.0
+    approach_feed_m_s: float = 0.25
+    retract_distance_m: float = 0.05
+    retract_angle_rad: float = 0.0
+    retract_feed_m_s: float = 0.25
+
+    def __post_init__(self) -> None:
+        if self.trajectory not in TRAJECTORIES:
+            raise ProcessError(unknown_name("trajectory", self.trajectory, TRAJECTORIES))
+        above = ("stepover_m", "spacing_m", "tool_radius_m", "feed_m_s", "approach_feed_m_s")
+        for name in (*above, "retract_feed_m_s", "passes"):
+            if not _LEAST <= getattr(self, name) <= _MOST:
+                given = f"{name} is {getattr(self, name)}"
+                raise ProcessError(f"{given}; give a value above 0 ({_LEAST:g} to {_MOST:g})")
+        lengths = ("edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m")
+        for name in (*lengths, "retract_distance_m", "dwell_s"):
+            if not 0.0 <= getattr(self, name) <= _MOST:
+                raise ProcessError(
+                    f"{name} is {getattr(self, name)}; give 0 or more, at most {_MOST:g}"
+                )
+        if self.direction is not None:
+            direction = np.asarray(self.direction, dtype=np.float64)
+            if direction.shape != (3,) or not 0.0 < np.linalg.norm(direction) < np.inf:
+                raise ProcessError(f"direction is {self.direction}; give 3 numbers, not all 0")
+
+
+def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segment, ...]:
+    """Segments that work `region`, indices (k,) of the surface's points, in driving order.
+
+    The region is cut into patches that lie flat without folds (`nrdf.surface.patch`), and each into
+    lines; what those leave out nearby has short lines of its own. Every line has its approach,
+    process and retract segments; an approach or retract distance of 0 leaves its segments out.
+    Places without room for the tool (`nrdf.surface.accessibility`) are left out like holes. Raises
+    ProcessError for a margin or clearance that leaves nothing of the region, a stepover wider than
+    it, a direction that stands on it, or more than `nrdf.toolpath.effort` allows.
+    """
+    region = with_room(surface, region, strategy.clearance_m)
+    patches = patches_of(surface, region)
+    _check_stepover(patches, strategy)
+    check_effort(patches, strategy)
+    lines: list[Line] = []
+    for sweep in _sweeps(patches, strategy):
+        found = [
+            block for patch, strokes in sweep for block in _even(surface, patch, strokes, strategy)
+        ]
+        drawn = [line for block in nearest_first(found) for line in block]
+        lines += drawn
+        reach, apart = strategy.tool_radius_m, strategy.stepover_m
+        lines += fill_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
+    if not lines:
+        deepest = max(patch.border.deepest for patch in patches)
+        raise ProcessError(
+            f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
+            f"innermost place is {deepest:.3g} m from its border; give less than that"
+        )
+    wanted = inside_margin(surface, region, patches, strategy.edge_margin_m)
+    lines += touch_up(
+        surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
+    )
+    contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
+    return drive(_held(contacts, normals, strategy), normals, strategy)
+
+
+def drive(
+    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+    normals: Sequence[np.ndarray],
+    strategy: Strategy,
+) -> tuple[Segment, ...]:
+    """Segments that drive given lines, in that order, with approach and retract.
+
+    lines: positions (n, 3), m, of the tool centre point, and quaternions_xyzw (n, 4), for each;
+    normals: (n, 3), outward, of the surface under each. Every second pass drives the lines
+    backwards, the tool turned half around the normal. Raises ProcessError for too many of them.
+    """
+    check_passes(sum(len(line[0]) for line in lines), len(lines), strategy.passes)
+    segments: list[Segment] = []
+    number = 0
+    for index in range(strategy.passes):
+        order = range(len(lines)) if index % 2 == 0 else range(len(lines) - 1, -1, -1)
+        for k in order:
+            (positions, quaternions), outward = lines[k], normals[k]
+            if index % 2:
+                positions, outward = positions[::-1], outward[::-1]
+                half = Rotation.from_rotvec(np.pi * outward)
+                quaternions = steady((half * Rotation.from_quat(quaternions[::-1])).as_quat())
+            segments += _segments(positions, quaternions, outward, number, strategy)
+            number += 1
+    return tuple(segments)
+
+
+def _held(
+    contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Positions and quaternions of a tool along lines on the surface."""
+    travel = np.concatenate([travel_of(line, 0.5 * strategy.stepover_m) for line in contacts])
+    upright = surface_frames(travel, np.concatenate(normals))
+    turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
+    cuts = np.cumsum([len(line) for line in contacts])[:-1]
+    quaternions = [steady(part) for part in np.split(turned.as_quat(), cuts)]
+    return list(zip(np.split(places, cuts), quaternions, strict=True))
+
+
+def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
+    length, width, _ = max((patch.extent for patch in patches), key=lambda extent: extent[0])
+    if strategy.stepover_m > length:
+        raise ProcessError(
+            f"stepover_m is {strategy.stepover_m:g}, wider than the region, which measures "
+            f"{length:.3g} by {width:.3g} m; give less than {length:.3g}"
+        )
+
+
+def _sweeps(
+    patches: Sequence[Patch], strategy: Strategy
+) -> list[list[tuple[Patch, Callable[[float], list[list[Stroke]]]]]]:
+    """For each sweep over the region, every patch with its strokes, by parts, at a stepover."""
+    margin = strategy.edge_margin_m
+    if strategy.trajectory in ("contour", "spiral"):
+        way = contour if strategy.trajectory == "contour" else spiral
+        return [[(patch, partial(way, patch, margin_m=margin)) for patch in patches]]
+    angles = _angles(patches, strategy.direction)
+    turns = (0.0, np.pi / 2) if strategy.trajectory == "cross-hatch" else (0.0,)
+    return [
+        [
+            (patch, partial(raster, patch, angle + turn, margin_m=margin))
+            for patch, angle in zip(patches, angles, strict=True)
+        ]
+        for turn in turns
+    ]
+
+
+def _even(
+    surface: Surface,
+    patch: Patch,
+    strokes: Callable[[float], list[list[Stroke]]],
+    strategy: Strategy,
+) -> list[list[Line]]:
+    """Blocks of lines on a patch, nowhere much farther apart than a stepover.
+
+    On few points, or round an edge, the patch's plane tells distances along the surface less well
+    than lines that are there, and turns of a spiral are farther apart in corners: if lines are too
+    far apart, they are drawn again, closer.
+    """
+    wanted = stepover = strategy.stepover_m
+    best, least = [], np.inf
+    for _ in range(_TRIES):
+        blocks = on_surface(
+            surface, patch, strokes(stepover), strategy.spacing_m, strategy.tool_radius_m
+        )
+        lines = [line for block in blocks for line in block]
+        if not lines:
+            break
+        track = track_of(lines, strategy.tool_radius_m, wanted)
+        apart = line_spacing([patch], track, wanted).distance
+        wide = float((apart > _WIDE * wanted).mean()) if len(apart) else 0.0
+        if wide < least:
+            best, least = blocks, wide
+        # Where but a few places are too far from the next line, the line is broken there.
+        usual = float(np.quantile(apart, 0.9)) if len(apart) else 0.0
+        if wide == 0.0 or usual <= wanted:
+            break
+        stepover *= max(wanted / usual, 0.75)
+    return best
+
+
+def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[float]:
+    """The angle of a raster's lines in the plane of each patch."""
+    longest = [patch.extent[2] for patch in patches]
+    if direction is None:
+        return longest
+    seen = [patch.angle_of(np.asarray(direction, dtype=np.float64)) for patch in patches]
+    if max(share for _, share in seen) < LEAST_IN_SURFACE:
+        raise ProcessError(
+            f"direction {np.asarray(direction).tolist()} stands on the region instead of running "
+            "along it; give one along the surface, or none for the region's longest extent"
+        )
+    return [
+        angle if share >= LEAST_IN_SURFACE else other
+        for (angle, share), other in zip(seen, longest, strict=True)
+    ]
+
+
+def _segments(
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    normals: np.ndarray,
+    number: int,
+    strategy: Strategy,
+) -> list[Segment]:
+    """Approach, process and retract of one line."""
+    work = Segment(
+        "process", number, positions, quaternions,
+        strategy.feed_m_s, strategy.force_n, strategy.dwell_s,
+    )  # fmt: skip
+    segments = [work]
+    ends = surface_frames(
+        Rotation.from_quat(quaternions[[0, -1]]).as_matrix()[:, :, 0], normals[[0, -1]]
+    )
+    if strategy.approach_distance_m > 0.0:
+        away = _leaving(ends[0], -strategy.approach_angle_rad)
+        start = positions[0] + strategy.approach_distance_m * away
+        way, held = np.stack([start, positions[0]]), quaternions[[0, 0]]
+        segments.insert(0, Segment("approach", number, way, held, strategy.approach_feed_m_s))
+    if strategy.retract_distance_m > 0.0:
+        away = _leaving(ends[1], strategy.retract_angle_rad)
+        stop = positions[-1] + strategy.retract_distance_m * away
+        way, held = np.stack([positions[-1], stop]), quaternions[[-1, -1]]
+        segments.append(Segment("retract", number, way, held, strategy.retract_feed_m_s))
+    return segments
+
+
+def _leaving(frame: np.ndarray, angle: float) -> np.ndarray:
+    """The direction at `angle` (rad) from the normal towards x of an upright frame (3, 3)."""
+    return np.sin(angle) * frame[:, 0] - np.cos(angle) * frame[:, 2]

@@ -1,0 +1,114 @@
+"""Strokes in a patch's plane brought onto the surface: lines of a tool's contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from nrdf.surface.patch import Patch
+from nrdf.surface.surface import Surface, unit
+from nrdf.toolpath.raster import Stroke
+
+_TOUCHES, _RESTS = 4, 2e-4  # rounds, and the distance (m) at which a contact counts as found
+_JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
+
+
+@dataclass(frozen=True)
+class Line:
+    """A stroke on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
+
+    contacts: np.ndarray
+    normals: np.ndarray
+
+    def reversed(self) -> Line:
+        return Line(self.contacts[::-1], self.normals[::-1])
+
+
+def on_surface(
+    surface: Surface,
+    patch: Patch,
+    parts: Sequence[Sequence[Stroke]],
+    spacing_m: float,
+    radius_m: float,
+) -> list[list[Line]]:
+    """Strokes brought onto the surface, their waypoints evenly spaced: a block of lines a part."""
+    strokes = [stroke for part in parts for stroke in part]
+    if not strokes:
+        return []
+    cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
+    even = []
+    flat = patch.at(np.concatenate(strokes))[0]
+    for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
+        plane = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
+        steps = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1), _JUMP * plane)
+        walked = np.concatenate([[0.0], np.cumsum(steps)])
+        count = max(int(np.rint(walked[-1] / spacing_m)), 1)
+        at = np.linspace(0.0, walked[-1], count + 1)
+        even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
+    places = np.concatenate(even)
+    flat, along = patch.at(places)
+    outward = unit(np.cross(along[:, 0], along[:, 1]))
+    contacts, normals, there = touching(surface, flat, outward, patch.spacing, radius_m)
+    farthest = 2.0 * spacing_m + 0.5 * patch.spacing
+    blocks, first = [], 0
+    ends = iter(np.cumsum([len(line) for line in even]))
+    for part in parts:
+        block = []
+        for _ in part:
+            last = int(next(ends))
+            found = first + np.flatnonzero(there[first:last])
+            # A waypoint that is missing alone is no gap; a step too far is.
+            step = np.linalg.norm(np.diff(contacts[found], axis=0), axis=1)
+            runs = np.split(found, np.flatnonzero(step > farthest) + 1)
+            block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
+            first = last
+        if block:
+            blocks.append(block)
+    return blocks
+
+
+def touching(
+    surface: Surface, flat: np.ndarray, outward: np.ndarray, near: float, radius_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The contact (n, 3) of a tool with the surface at places (n, 3), at most `near` (m) from them.
+
+    Also the smooth normals there (n, 3), along which it stands, and whether there is any (n,).
+    outward: (n, 3), of the side that the places are on. Next to an edge the surface that faces the
+    tool may be another than the one that faces outward; the tool touches the former.
+    """
+    contacts, normals, off = surface.nearest(flat, outward, 0.25)
+    # Where thin parts are hardly sampled, there may be no surface under a place.
+    there = off < near
+    normals = surface.smooth_normals(contacts, normals, radius_m)
+    moving = np.flatnonzero(there)
+    for _ in range(_TOUCHES):
+        found, _, off = surface.nearest(contacts[moving], normals[moving])
+        there[moving] = off < near
+        moved = (off > _RESTS) & there[moving]
+        moving = moving[moved]
+        if not len(moving):
+            break
+        contacts[moving] = found[moved]
+        normals[moving] = surface.smooth_normals(contacts[moving], normals[moving], radius_m)
+    return contacts, normals, there
+
+
+def nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
+    """Blocks of lines ordered, and driven forwards or backwards, so that ways between are short."""
+    waiting, ordered = list(blocks), []
+    place: np.ndarray | None = None
+    while waiting:
+        if place is None:
+            block = waiting.pop(0)
+        else:
+            ends = np.array([[b[0].contacts[0], b[-1].contacts[-1]] for b in waiting])
+            away = np.linalg.norm(ends - place, axis=2)
+            which, end = np.unravel_index(np.argmin(away), away.shape)
+            block = waiting.pop(int(which))
+            if end == 1:
+                block = [line.reversed() for line in block[::-1]]
+        ordered.append(block)
+        place = block[-1].contacts[-1]
+    return ordered

@@ -1,0 +1,249 @@
+"""Pictures of point clouds with their regions and the lines on them, for a person to look at."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.geometry.points import canonical_transform, estimate_normals, thin
+from nrdf.io.ply import write_atomically
+from nrdf.viz.render import FRONT, Camera, Scene, Strokes, render
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BASE_COLOUR = (0.80, 0.81, 0.83)
+PALETTE = (
+    "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442",
+    "#882255", "#44AA99", "#999933", "#332288", "#AA4499",
+)  # fmt: skip
+"""Okabe and Ito's colours for the colour-blind, then those of Tol's "muted" that differ most."""
+PALE, DEEP = 0.55, 0.55
+"""Shares of a region's colour in the region, and in the lines on it, where there are lines."""
+MOST_POINTS = 20_000
+_MARGIN = 0.05  # canonical, around each object
+
+
+OTHER_SIDES = (
+    Camera(0.65 + np.pi, 0.38),
+    Camera(0.65, -0.45),
+    Camera(0.65 + np.pi, -0.45),
+)
+"""Where to look from when a region cannot be seen from the front."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One object in a picture.
+
+    points: (n, 3), any unit, +X forward, +Y up; normals: (n, 3) outward, or None to estimate them;
+    regions: name to indices (k,) or boolean mask (n,); note: a line under the title. lines: name of
+    a region to lines (k, 3) on it, such as a tool's; its colour is paler then, and theirs deep.
+    """
+
+    title: str
+    points: np.ndarray
+    normals: np.ndarray | None = None
+    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
+    note: str = ""
+    lines: Mapping[str, Sequence[np.ndarray]] = field(default_factory=dict)
+
+
+def region_colours(names: Sequence[str]) -> dict[str, np.ndarray]:
+    """One colour (3,) in [0, 1] for each region name, in order; repeats after twelve."""
+    values = [[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in PALETTE]
+    return {name: np.array(values[i % len(values)]) for i, name in enumerate(names)}
+
+
+def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> None:
+    """Write a picture of `panels` side by side, one colour a region; `path`'s ending is its format.
+
+    The same camera is used for all of them, and a second row is added from another side if some
+    region could hardly be seen (beside the first for one panel). `size`: width of a panel in
+    pixels. Takes about 0.2 s a panel. Raises OutputError if the file cannot be written.
+    """
+    rows, colours = render_panels(panels, size)
+    if len(panels) == 1:
+        rows = [_of_one_height([row[0] for row in rows])]
+    _compose(rows, panels, colours, Path(path), size)
+
+
+def render_panels(
+    panels: Sequence[Panel], size: int
+) -> tuple[list[list[np.ndarray]], dict[str, np.ndarray]]:
+    """The pictures that `draw_regions` puts together, and each region's colour.
+
+    One row a view, in it an array (h, size, 3) in [0, 1] for each panel, all of the same scale.
+    """
+    names = list(dict.fromkeys(n for panel in panels for n in (*panel.regions, *panel.lines)))
+    colours = region_colours(names)
+    drawn = [_prepare(panel, names) for panel in panels]
+    hidden = _hidden_regions(drawn, len(names))
+    cameras = [FRONT, _best_side(drawn, hidden)] if hidden else [FRONT]
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        rows = pool.map(lambda camera: _row(drawn, colours, camera, size), cameras)
+        return list(rows), colours
+
+
+def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:
+    """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side
+    and with its own lines."""
+    every = list(dict.fromkeys((*panel.regions, *panel.lines)))
+    table = np.array([*region_colours(every).values(), BASE_COLOUR])
+    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+    scene = _prepare(panel, every)
+
+    def draw(name: str) -> np.ndarray:
+        own = scene.region == every.index(name)
+        if not own.any():
+            return np.ones((size, size, 3), np.float32)
+        axes = Camera.towards(scene.normals[own].mean(axis=0)).axes()
+        view = scene.points @ axes.T
+        low, high = view[own].min(axis=0)[:2], view[own].max(axis=0)[:2]
+        side = 1.2 * float((high - low).max()) + _MARGIN
+        corner = (low + high - side) / 2
+        near = ((view[:, :2] > corner - 0.05) & (view[:, :2] < corner + side + 0.05)).all(axis=1)
+        colours = pale if scene.lines else table
+        drawn = scene.select(near, every.index(name))
+        return render(drawn, axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return dict(zip(names, pool.map(draw, names), strict=True))
+
+
+def _prepare(panel: Panel, names: list[str]) -> Scene:
+    points = np.asarray(panel.points, np.float64)
+    region = np.full(len(points), -1)
+    # Where regions overlap, the one listed last is on top.
+    for name, chosen in panel.regions.items():
+        region[np.asarray(chosen)] = names.index(name)
+    kept = thin(points, MOST_POINTS, np.random.default_rng(0))
+    centre, scale = canonical_transform(points[kept])
+    points = (points[kept] - centre) / scale
+    normals = estimate_normals(points) if panel.normals is None else panel.normals[kept]
+    distance, near = cKDTree(points).query(points, min(7, len(points)))
+    # Smooth shading: normals are averaged where neighbours face the same way.
+    alike = np.einsum("ni,nki->nk", normals, normals[near]) > 0.7
+    smooth = np.einsum("nk,nki->ni", alike.astype(float), normals[near])
+    smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-12)
+    spacing = distance[:, -1] * np.sqrt(np.pi / 6.0)
+    typical = float(np.median(spacing))
+    radius = np.clip(spacing, 0.6 * typical, 1.4 * typical)
+    lines = [
+        Strokes(names.index(name), tuple((np.asarray(line) - centre) / scale for line in drawn))
+        for name, drawn in panel.lines.items()
+    ]
+    return Scene(points, smooth, region[kept], radius, tuple(lines))
+
+
+def _row(
+    drawn: list[Scene], colours: dict[str, np.ndarray], camera: Camera, size: int
+) -> list[np.ndarray]:
+    """Pictures (h, size, 3), all of the same height and scale, of prepared clouds."""
+    axes = camera.axes()
+    corners = [(view.min(0)[:2], view.max(0)[:2]) for view in (c.points @ axes.T for c in drawn)]
+    low = np.min([corner[0] for corner in corners], axis=0) - _MARGIN
+    high = np.max([corner[1] for corner in corners], axis=0) + _MARGIN
+    pixels = size / (high[0] - low[0])
+    shape = (int(np.ceil(pixels * (high[1] - low[1]))), size)
+    table = np.array([*colours.values(), BASE_COLOUR])
+    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+
+    def draw(cloud: Scene, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        first = np.maximum(np.floor((corner[0] - _MARGIN - low) * pixels).astype(int), 0)
+        last = np.minimum(np.ceil((corner[1] + _MARGIN - low) * pixels).astype(int), shape[::-1])
+        canvas = np.ones((*shape, 3), np.float32)
+        canvas[first[1] : last[1], first[0] : last[0]] = render(
+            cloud, axes, low + first / pixels, pixels, tuple((last - first)[::-1]),
+            pale if cloud.lines else table, DEEP * table,
+        )  # fmt: skip
+        return canvas[::-1]
+
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return list(pool.map(draw, drawn, corners))
+
+
+def _hidden_regions(drawn: list[Scene], count: int) -> list[int]:
+    """Regions of which less than a quarter of the points can be seen from the front."""
+    return [i for i in range(count) if _facing(drawn, i, FRONT) < 0.25]
+
+
+def _best_side(drawn: list[Scene], hidden: list[int]) -> Camera:
+    return max(OTHER_SIDES, key=lambda c: sum(min(_facing(drawn, i, c), 0.4) for i in hidden))
+
+
+def _facing(drawn: list[Scene], region: int, camera: Camera) -> float:
+    """Share of a region's points, over all clouds, that face the camera; 1 if there are none."""
+    toward = camera.axes()[2]
+    normals = np.concatenate([cloud.normals[cloud.region == region] for cloud in drawn])
+    return float((normals @ toward > 0.1).mean()) if len(normals) else 1.0
+
+
+def _of_one_height(images: list[np.ndarray]) -> list[np.ndarray]:
+    """Pictures with white above the lower ones."""
+    tall = max(len(image) for image in images)
+    return [np.pad(i, ((tall - len(i), 0), (0, 0), (0, 0)), constant_values=1.0) for i in images]
+
+
+def _compose(
+    rows: list[list[np.ndarray]],
+    panels: Sequence[Panel],
+    colours: dict[str, np.ndarray],
+    path: Path,
+    size: int,
+) -> None:
+    """Panels with their titles above and the legend below, written to `path`."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    dpi = 100
+    header = 62 if any(panel.note for panel in panels) else 40
+    footer = 50 if colours else 10
+    width = size * len(rows[0])
+    height = header + footer + sum(row[0].shape[0] for row in rows)
+    figure = Figure((width / dpi, height / dpi), dpi=dpi, facecolor="white")
+    FigureCanvasAgg(figure)
+    top = height - header
+    for i, panel in enumerate(panels):
+        x = (i + 0.5) / len(panels)
+        text: dict[str, Any] = {"ha": "center", "va": "top", "family": "DejaVu Sans"}
+        figure.text(x, 1 - 12 / height, panel.title, size=13, weight="bold", color="#222", **text)
+        figure.text(x, 1 - 38 / height, panel.note, size=10.5, color="#666", **text)
+    for row in rows:
+        top -= row[0].shape[0]
+        for i, image in enumerate(row):
+            figure.figimage((image * 255).astype(np.uint8), xo=i * size, yo=top)
+    add_legend(figure, colours)
+    write_figure(figure, path, dpi)
+
+
+def add_legend(figure: Figure, colours: Mapping[str, np.ndarray]) -> None:
+    """Each region's name beside its colour, along the lower edge of a matplotlib figure."""
+    from matplotlib.patches import Patch
+
+    if colours:
+        figure.legend(
+            handles=[Patch(color=tuple(colour), label=name) for name, colour in colours.items()],
+            loc="lower center",
+            ncols=max(1, min(len(colours), int(figure.get_figwidth() / 1.5))),
+            frameon=False,
+            fontsize=11.5,
+            handlelength=1.1,
+            handleheight=1.1,
+        )
+
+
+def write_figure(figure: Figure, path: Path, dpi: int) -> None:
+    """Write a matplotlib figure, whole or not at all. Raises OutputError if it cannot be."""
+    drawn = io.BytesIO()
+    ending = path.suffix.removeprefix(".") or "png"
+    figure.savefig(drawn, format=ending, dpi=dpi, pil_kwargs={"compress_level": 4})
+    write_atomically(path, [drawn.getbuffer()])

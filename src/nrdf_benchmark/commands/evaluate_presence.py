@@ -1,0 +1,109 @@
+"""`nrdf eval presence`: how far regions can be believed, and what absent ones are told by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from nrdf.commands.console import console, progress_bar, show, table
+from nrdf.commands.one_run import one_run_at
+
+if TYPE_CHECKING:
+    from nrdf.scans.pose_scorer import PoseScorer
+    from nrdf_benchmark.objects_match import Finder
+    from nrdf_benchmark.presence import Example
+
+
+@one_run_at("out")
+def presence(
+    out: Path,
+    objects: Path | None = None,
+    model: str = "chair",
+    category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
+    pairs: int = 12,
+    device: str = "cpu",
+) -> None:
+    """Fit the overlap that is to be expected of a region.
+
+    Parts of labelled objects, and regions of pairs of family members that no training has seen, are
+    sought whole and in simulated scans; a logistic regression tells from what a retrieval knows of
+    itself how well they overlap with the truth, and which the target lacks. Shows its coefficients,
+    to be compared with those in nrdf/regions/presence.py, and what rules tell that were fitted on
+    other products and pairs. Started again, it goes on where it was.
+
+    Example: nrdf eval presence --objects objects/ --out runs/presence
+
+    Args:
+        out: Folder that keeps what was measured.
+        objects: Folder of labelled objects, as of nrdf eval objects; chairs and stools are taken.
+        model: Zoo name, weight file or run, for the labelled objects.
+        category: Families: chair, car, plane, or several of them.
+        pairs: Pairs of members of each family, about 10 s each on one core.
+        device: cpu, cuda, cuda:N or auto.
+    """
+    from functools import partial
+
+    import numpy as np
+
+    from nrdf_benchmark.presence import (
+        OBJECT_STEP,
+        choose_pairs,
+        cross_validate,
+        examples_of_members,
+        examples_of_objects,
+        fit,
+        kept,
+        summary,
+    )
+
+    every: list[Example] = []
+    if objects is not None:
+        finder, keys = _finder(objects, model, device)
+        with progress_bar("parts of objects") as progress:
+            chosen = [(key, other) for key in keys for other in keys if key != other][::OBJECT_STEP]
+            for done, (key, other) in enumerate(chosen, 1):
+                name = f"{key}-{other}".replace("/", "_")
+                every += kept(out, name, partial(examples_of_objects, finder, key, other))
+                progress(done, len(chosen))
+    for name in category:
+        judge = None
+        with progress_bar(f"pairs of {name}s") as progress:
+            for done, pair in enumerate(choose_pairs(name, pairs), 1):
+
+                def collect(name: str = name, pair: int = pair) -> list[Example]:
+                    nonlocal judge
+                    judge = judge or _judge(name, device)
+                    return examples_of_members(judge, pair)
+
+                every += kept(out, f"{name}-{pair:03d}", collect)
+                progress(done, pairs)
+    rule = fit(every)
+    weights = ", ".join(f"{weight:.2f}" for weight in rule.weights)
+    console.print(f"bias {rule.bias:.2f}; weights {weights}")
+    overlap = cross_validate(every)
+    heading = ("of", "told absent", "skipped", "overlap expected", "true")
+    shown = table("fitted on other products and pairs", "", "", "", *heading, texts=3)
+    for source, kind, state, of, told, skipped, mean, true in summary(every, overlap):
+        counts = (str(of), str(told), str(skipped))
+        shown.add_row(source, kind, state, *counts, f"{mean:.2f}", f"{true:.2f}")
+    show(shown)
+    there = np.array([not e.absent for e in every])
+    truth = np.array([e.overlap for e in every])
+    correlation = np.corrcoef(overlap[there], truth[there])[0, 1]
+    console.print(f"correlation of expected and true overlap of what is there: {correlation:.2f}")
+
+
+def _finder(folder: Path, model: str, device: str) -> tuple[Finder, list[str]]:
+    from nrdf.field.zoo import find_weights
+    from nrdf_benchmark.objects import read_objects
+    from nrdf_benchmark.objects_match import Finder, Settings
+
+    settings = Settings(folder.resolve(), find_weights(model).resolve(), device=device)
+    return Finder(settings), [item.key for item in read_objects(folder, ("chair", "stool"))]
+
+
+def _judge(name: str, device: str) -> PoseScorer:
+    import nrdf
+    from nrdf.scans.pose_scorer import PoseScorer
+
+    return PoseScorer(nrdf.load_model(name, device))

@@ -1,0 +1,107 @@
+"""The demonstration on the bundled arm, against the figures that it must reach."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.bundled import TARGETS
+from nrdf.errors import DataError
+from nrdf.robot.model.arm import load_arm
+from nrdf.robot.report.metrics import report_of
+from nrdf.robot.simulation.simulate import read_work, simulate
+
+
+@dataclass(frozen=True)
+class Figure:
+    """name, the bar in words, a value for each report, and whether each meets the bar."""
+
+    name: str
+    bar: str
+    values: tuple[float, ...]
+    met: tuple[bool, ...]
+
+
+def drive(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, Any]]:
+    """The report of each of the demonstration's chairs.
+
+    Raises DataError where `folder` is not what `nrdf demo` wrote.
+    """
+    missing = [name for name in TARGETS if not (folder / name).is_dir()]
+    if missing:
+        raise DataError(f"{folder} has no {', '.join(missing)}: nrdf demo --out {folder} first")
+    reports = {}
+    for name in TARGETS:
+        work = read_work(folder / name)
+        progress(name)
+        done = simulate(work, load_arm())
+        reports[name] = report_of(done)
+    return reports
+
+
+def together(reports: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """All chairs as one report: shares of all waypoints and of all contact, the worst speeds."""
+    paths = [path for report in reports.values() for path in report["paths"]]
+    totals = [report["total"] for report in reports.values()]
+    speeds = [report["speed"] for report in reports.values()]
+    forces = [path["force"] for path in paths if path["force"]]
+    contact = sum(force["seconds"] for force in forces)
+    within = sum(force["within"] * force["seconds"] for force in forces)
+    reached = sum(total["reached"] for total in totals)
+    return {
+        "paths": paths,
+        "total": {
+            "reached_share": reached / sum(total["waypoints"] for total in totals),
+            "collisions": sum(total["collisions"] for total in totals),
+            "force_within": within / contact if contact else None,
+        },
+        "speed": {
+            "ik_ms_per_waypoint": max(speed["ik_ms_per_waypoint"] for speed in speeds),
+            "times_real_time": min(speed["times_real_time"] for speed in speeds),
+        },
+    }
+
+
+def figures(reports: dict[str, dict[str, Any]]) -> list[Figure]:
+    """What the demonstration must reach, report by report."""
+
+    def figure(
+        name: str, bar: str, value: Callable[[dict[str, Any]], float], most: float
+    ) -> Figure:
+        values = tuple(value(report) for report in reports.values())
+        # A bar below 0 is the negative of a least value.
+        good = tuple(v <= most if most >= 0.0 else v >= -most for v in values)
+        return Figure(name, bar, values, good)
+
+    def worst(report: dict[str, Any], key: str) -> float:
+        return max(path[key] for path in report["paths"])
+
+    def lost(report: dict[str, Any], against: str) -> float:
+        # Of what was to be done, not of the whole region: what is left out is no excuse.
+        parts = [path["coverage"] for path in report["paths"] if path["coverage"][against] > 0.0]
+        return max((100.0 * (1.0 - part["achieved"] / part[against]) for part in parts), default=0)
+
+    return [
+        figure("waypoints reached, %", "at least 95",
+               lambda r: 100.0 * r["total"]["reached_share"], -95.0),
+        figure("position error, mm", "at most 0.1",
+               lambda r: 1e3 * worst(r, "position_error_m"), 0.1),
+        figure("axis error, °", "at most 0.1",
+               lambda r: float(np.degrees(worst(r, "axis_error_rad"))), 0.1),
+        figure("kinematics, ms a waypoint", "at most 5",
+               lambda r: r["speed"]["ik_ms_per_waypoint"], 5.0),
+        figure("moves with a collision, all reported", "0",
+               lambda r: float(r["total"]["collisions"]), 0.0),
+        figure("contact within ±20 % of the force, %", "at least 95",
+               lambda r: 100.0 * (r["total"]["force_within"] or 0.0), -95.0),
+        figure("coverage lost of the plan, worst region, %", "at most 3",
+               lambda r: lost(r, "planned"), 3.0),
+        figure("coverage lost of what is driven, worst region, %", "at most 3",
+               lambda r: lost(r, "driven"), 3.0),
+        figure("times faster than real time", "at least 10",
+               lambda r: r["speed"]["times_real_time"], -10.0),
+    ]  # fmt: skip

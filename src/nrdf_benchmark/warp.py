@@ -1,0 +1,173 @@
+"""Carried waypoints against the exact truth of the parametric families, on unseen members.
+
+Rasters are planned on every region of a reference and carried to another member as `nrdf transfer`
+does it. Members are canonical: lengths are shares of an object's longest side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from nrdf.errors import DataError, ProcessError
+from nrdf.io.cloud import PointCloud
+from nrdf.process.bound_knowledge import BoundKnowledge
+from nrdf.process.correspondence import Correspondence
+from nrdf.process.knowledge import Knowledge
+from nrdf.process.transfer import ProcessTransfer
+from nrdf.process.warp import carry
+from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.regions.model import Model
+from nrdf.shapes.families import Family, SurfaceSample, get_family
+from nrdf.shapes.families.member import Member
+from nrdf_benchmark.family import CLOUD_POINTS, FIRST_SEED
+
+SMALLEST_REGION = 60
+"""Points of the reference's cloud that a region needs to be taught."""
+_PRESENT = 20  # points of the target's cloud from which on it has a region
+_TRUTH_POINTS = 40_000
+_RASTER = {
+    "kind": "custom", "name": "raster", "transfer": "carry", "stepover_m": 0.03,
+    "spacing_m": 0.01, "tool": {"radius_m": 0.025}, "feed_m_s": 0.1,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CarryResult:
+    """Waypoints and regions of all pairs.
+
+    errors: for each pair the distances (w,) of carried waypoints from their true places, those
+    that exist. lost: share of the waypoints with a true place that were not carried. invented:
+    share of those without one that were carried, of regions that the target has. confidence:
+    (r,) of every region on every target; present: (r,) whether the target has it.
+    """
+
+    category: str
+    errors: tuple[np.ndarray, ...]
+    lost: float
+    invented: float
+    confidence: np.ndarray
+    present: np.ndarray
+
+    @property
+    def medians(self) -> np.ndarray:
+        """The median error of each pair, (pairs,)."""
+        return np.array([np.median(errors) for errors in self.errors])
+
+    def kept(self, min_confidence: float, present: bool) -> float:
+        """Share of the regions that targets have (or lack) with at least that confidence."""
+        asked = self.confidence[self.present == present]
+        return float((asked >= min_confidence).mean()) if len(asked) else float("nan")
+
+
+def evaluate_warp(
+    model: Model,
+    category: str,
+    pairs: int = 50,
+    progress: Callable[[int, int], None] | None = None,
+) -> CarryResult:
+    """Carry rasters on every region between `pairs` pairs of unseen members.
+
+    `progress` is told (done, all). Raises DataError for a category without a family, or no pairs.
+    """
+    if pairs < 1:
+        raise DataError(f"{pairs} pairs asked for; give at least 1")
+    family = get_family(category)
+    errors, counts, confidence, present = [], np.zeros(4), [], []
+    for number in range(pairs):
+        reference = family.member(FIRST_SEED + 2 * number)
+        target = family.member(FIRST_SEED + 2 * number + 1)
+        rng = np.random.default_rng(FIRST_SEED + number)
+        here = reference.sample_surface(CLOUD_POINTS, rng)
+        there = target.sample_surface(CLOUD_POINTS, rng)
+        teacher = ProcessTransfer(_lesson(category, family, here), model)
+        embedded = model.embed(PointCloud(there.points, there.normals))
+        way = Correspondence(teacher.reference, embedded)
+        matches = teacher.taught.retrieve_all(teacher.lesson.regions, embedded)
+        named = family.region_of(there.coordinates)
+        truth = _Truth(reference, target, rng)
+        found = []
+        for name in matches:
+            has = int((named == name).sum())
+            confidence.append(matches[name].score)
+            present.append(has >= _PRESENT)
+            if has >= _PRESENT:
+                carried = _carried(teacher, way, name, truth)
+                if carried is not None:
+                    found.append(carried[0])
+                    counts += carried[1]
+        errors.append(np.concatenate(found) if found else np.zeros(0))
+        if progress is not None:
+            progress(number + 1, pairs)
+    lost, existing, invented, absent = counts
+    return CarryResult(
+        category,
+        tuple(e for e in errors if len(e)),
+        lost / max(existing, 1),
+        invented / max(absent, 1),
+        np.array(confidence),
+        np.array(present),
+    )
+
+
+def _lesson(category: str, family: Family, surface: SurfaceSample) -> BoundKnowledge:
+    """A raster on every region of a reference that is large enough."""
+    named = family.region_of(surface.coordinates)
+    regions = {
+        name: np.flatnonzero(named == name)
+        for name in family.region_names
+        if (named == name).sum() >= SMALLEST_REGION
+    }
+    rows = [
+        {"name": name, "indices": indices.tolist(), "processes": [_RASTER]}
+        for name, indices in regions.items()
+    ]
+    content = {"category": category, "reference": {"cloud": "reference"}, "regions": rows}
+    cloud = PointCloud(surface.points, surface.normals, unit="m")
+    return BoundKnowledge(Knowledge.model_validate(content), cloud, regions)
+
+
+class _Truth:
+    """Where places of one member are on another: by the nearest of many exact pairs."""
+
+    def __init__(self, reference: Member, target: Member, rng: np.random.Generator) -> None:
+        dense = reference.sample_surface(_TRUTH_POINTS, rng)
+        located = target.locate(dense.coordinates)
+        self._points, self._there, self._exists = dense.points, located.points, located.exists
+        self._tree = cKDTree(oriented_features(dense.points, dense.normals, NORMAL_WEIGHT))
+
+    def places(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The true places (m, 3) of points (m, 3) with normals (m, 3), and which exist (m,)."""
+        nearest = self._tree.query(oriented_features(points, normals, NORMAL_WEIGHT))[1]
+        return self._there[nearest] + points - self._points[nearest], self._exists[nearest]
+
+
+def _carried(
+    teacher: ProcessTransfer, way: Correspondence, name: str, truth: _Truth
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Errors (w,) of one region's carried waypoints; and how many were lost of how many that
+    exist, invented of how many that do not. None where no raster fits the region."""
+    try:
+        lines = teacher.lines(name, 0)
+    except ProcessError:
+        return None
+    carried, _ = carry(way, lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
+    errors, counts = [], np.zeros(4)
+    arrived = [np.full((len(line.positions), 3), np.nan) for line in lines]
+    for line in carried:
+        arrived[line.taught][line.waypoints] = line.positions
+    for planned, there in zip(lines, arrived, strict=True):
+        outward = -_tool_z(planned.quaternions_xyzw)
+        exact, exists = truth.places(planned.positions, outward)
+        has = np.isfinite(there[:, 0])
+        errors.append(np.linalg.norm(there - exact, axis=1)[has & exists])
+        counts += [(exists & ~has).sum(), exists.sum(), (~exists & has).sum(), (~exists).sum()]
+    return np.concatenate(errors), counts
+
+
+def _tool_z(quaternions_xyzw: np.ndarray) -> np.ndarray:
+    return np.asarray(Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2])

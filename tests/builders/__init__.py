@@ -1,0 +1,1 @@
+"""Objects, files and small models that several tests build."""

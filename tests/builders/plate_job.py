@@ -1,0 +1,56 @@
+"""The bundled arm, and a job on a plate, as fixtures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nrdf.robot.model.arm import load_arm
+from nrdf.toolpath.types import Segment, ToolPath
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return load_arm()
+
+
+def write_job_on(folder, points, normals, region, segments):
+    """A job on an object (n, 3), (n, 3) whose first points, so many, are the region 'top'."""
+    import nrdf
+    from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
+    from nrdf.process.knowledge_file import write_knowledge
+    from nrdf.toolpath.types import Job, write_job
+
+    nrdf.write_cloud(folder / "target.ply", nrdf.PointCloud(points, normals, unit="m"))
+    process = Process(
+        kind="sand",
+        stepover_m=0.03,
+        feed_m_s=0.1,
+        force_n=10.0,
+        tool=Tool(name="disc", radius_m=0.025),
+    )
+    region = Region(name="top", indices=list(range(region)), processes=[process])
+    knowledge = Knowledge(
+        category="chair", reference=Reference(cloud="target.ply"), regions=[region]
+    )
+    write_knowledge(folder / "knowledge.yaml", knowledge)
+    path = ToolPath("top", "sand", "disc", 0.025, tuple(segments))
+    write_job(folder, Job("chair", "target", (path,)))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    """A plate of 0.3 m with one region, in its folder."""
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-0.15, 0.15, (2500, 2))
+    top = np.stack([flat[:, 0], np.full(2500, 0.42), flat[:, 1]], axis=1)
+    below = top - [0.0, 0.03, 0.0]
+    up = np.tile([0.0, 1.0, 0.0], (2500, 1))
+    turned = np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (9, 1))
+    segments = []
+    for number, z in enumerate((-0.05, 0.0, 0.05)):
+        line = np.stack([np.linspace(-0.1, 0.1, 9), np.full(9, 0.42), np.full(9, z)], axis=1)
+        segments.append(Segment("process", number, line, turned, 0.1, 10.0))
+    whole = np.concatenate([top, below]), np.concatenate([up, -up])
+    return write_job_on(tmp_path_factory.mktemp("job"), *whole, 2500, segments)

@@ -1,0 +1,266 @@
+"""`nrdf knowledge`, `nrdf transfer` and what follows, as a user types them."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+import trimesh
+
+from builders.taught_box import SIZE, cloud, faces
+from nrdf import cli
+from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.process.knowledge_file import read_knowledge
+from nrdf.toolpath.types import read_job
+
+
+@pytest.fixture
+def files(tmp_path):
+    """box.ply, top.ply, front.ply, and new.ply in millimetres."""
+    whole = cloud()
+    write_cloud(tmp_path / "box.ply", whole)
+    for name in ("top", "front"):
+        write_cloud(tmp_path / f"{name}.ply", whole.select(faces(whole)[name]))
+    other = cloud(SIZE, seed=1)
+    write_cloud(tmp_path / "new.ply", PointCloud(1000 * other.points, other.normals, "mm", "cell"))
+    return tmp_path
+
+
+@pytest.fixture
+def taught(files):
+    words = f"knowledge new --reference {files}/box.ply --category chair --region {files}/top.ply "
+    words += f"{files}/front.ply --kind sand oil --out {files}/box.yaml"
+    assert cli.run(words.split()) == 0
+    return files
+
+
+def transfer(files, model, *more, kind="--any-kind"):
+    words = f"transfer {files}/box.yaml --model {model} --target {files}/new.ply --out {files}/job"
+    return cli.run([*words.split(), *([kind] if kind else []), *more])
+
+
+def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
+    assert cli.run(["knowledge", "check", str(taught / "box.yaml")]) == 0
+    said = capsys.readouterr().out
+    assert "2 processes on 2 regions: nothing is wrong" in said and "30 mm" in said
+    assert transfer(taught, untrained, "--min-coverage", "0.5", "--require-all") == 0
+    said = capsys.readouterr().out
+    assert "2 tool paths" in said and "top" in said and "oil" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert report["limits"]["set"] == {
+        "min_coverage": 0.5, "require_all": True, "any_kind": True,
+    }  # fmt: skip
+    assert report["model"]["category"] == "chair" and report["versions"]["nrdf"]
+    job = read_job(taught / "job")
+    assert job.frame == "cell" and [path.process for path in job.paths] == ["sand", "oil"]
+    assert max(abs(s.positions).max() for path in job.paths for s in path.segments) < 1.0
+    assert cli.run(["export", str(taught / "job"), "--format", "urscript", "csv"]) == 0
+    assert cli.run(["knowledge", "check", str(taught / "job" / "knowledge.yaml")]) == 0
+
+
+def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, capsys):
+    turned = cloud(SIZE, seed=1)
+    points = 1000 * turned.points[:, [2, 0, 1]] + [3000.0, 0.0, 300.0]
+    scan = PointCloud(points, turned.normals[:, [2, 0, 1]], None, "cell")
+    write_cloud(taught / "new.ply", scan)
+    assert transfer(taught, untrained, "--up", "z", "--skip", "floor") == 0
+    assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert report["alignment"]["unit"] == {"name": "mm", "origin": "guessed"}
+    sand = next(path for path in read_job(taught / "job").paths if path.process == "sand")
+    heights = [s.positions[:, 2] for s in sand.segments if s.kind == "process"]
+    assert np.abs(np.concatenate(heights) - 0.6).max() < 0.01
+    # How it stands there goes along in the job, for whoever drives or draws it.
+    job = read_job(taught / "job")
+    np.testing.assert_allclose(job.up, [0, 0, 1], atol=0.02)
+    assert report["pose"]["up"] == pytest.approx(job.up.tolist())
+    corner = job.pose.to_scan(np.zeros((1, 3)))[0]
+    np.testing.assert_allclose(corner, [3.0, 0.0, 0.3], atol=0.02)
+    assert cli.run(["export", str(taught / "job"), "--format", "csv"]) == 0
+    head = (taught / "job" / "export" / "csv" / "nrdf_chair.csv").read_text()[:2000]
+    assert re.search(r"up for the object is -?0\.0\d+ -?0\.0\d+ (1\.0|0\.9)", head)
+
+
+def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
+    """In its unit, whatever was sampled of it; the limit is on that distance."""
+    box = trimesh.creation.box(1000 * SIZE)
+    box.export(taught / "box.stl")
+    words = ("--target", str(taught / "box.stl"), "--unit", "mm")
+    assert transfer(taught, untrained, *words, "--max-surface-distance-mm", "20") == 0
+    report = json.loads((taught / "job" / "report.json").read_text())
+    for path in report["paths"]:
+        assert path["measures"]["judged_by"] == "the mesh as given (12 triangles)"
+        assert path["measures"]["true_distance_95_m"] < 1e-3
+        assert 5e-3 < path["measures"]["step_worst_m"] < 0.03
+    page = (taught / "job" / "report.html").read_text()
+    assert "the mesh as given (12 triangles)" in page and "off the object" in page
+    tight = ("--max-surface-distance-mm", "0", "--max-step-mm", "1", "--overwrite")
+    assert transfer(taught, untrained, *words, *tight) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the worst distance from the mesh as given (12 triangles) is" in said
+    assert "the largest step between waypoints is" in said and "above 1 mm" in said
+
+
+def test_scan_options_need_up(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--skip", "floor") == 2
+    assert "--sensor and --skip are for scans: give --up" in capsys.readouterr().err
+
+
+def test_a_limit_that_is_not_met_ends_with_3_after_writing(taught, untrained, capsys):
+    limits = ("--max-line-spacing-mm", "1", "--max-cycle-time-s", "2")
+    assert transfer(taught, untrained, *limits) == 3
+    said = capsys.readouterr().err
+    assert "limits not met:" in said and "above 1 mm" in said and "above 2 s" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert len(report["limits"]["not_met"]) == 3
+    assert (taught / "job" / "toolpaths.json").exists()
+
+
+def test_a_box_is_no_chair_and_ends_with_3_after_writing(taught, untrained, capsys):
+    assert transfer(taught, untrained, kind=None) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the target does not look like a chair" in said and "--any-kind" in said
+    report = json.loads((taught / "job" / "report.json").read_text())
+    assert not report["kind"]["fits"] and report["kind"]["warnings"][0] in report["doubts"]
+    assert report["kind"]["warnings"][0] in report["warnings"]
+    assert (taught / "job" / "toolpaths.json").exists()
+    assert transfer(taught, untrained, "--overwrite") == 0
+    assert "the target does not look like a chair" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_region_without_enough_confidence_is_skipped(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--min-confidence", "1") == 4
+    said = " ".join(capsys.readouterr().err.split())
+    assert "region 'top' is skipped: confidence" in said and "below 1" in said
+    assert not (taught / "job" / "toolpaths.json").exists()
+    assert json.loads((taught / "job" / "report.json").read_text())["total"]["paths"] == 0
+
+
+def test_without_any_tool_path_each_region_says_why_and_a_hint_follows(taught, untrained, capsys):
+    assert transfer(taught, untrained, "--min-confidence", "1", "--require-all") == 4
+    said = capsys.readouterr().err
+    assert "nrdf: no tool path could be planned:\n  region 'top': confidence" in said
+    assert "\n  region 'front': confidence" in said and "try --up z" in said
+    words = ("--min-confidence", "1", "--up", "y", "--skip", "floor", "--overwrite")
+    assert transfer(taught, untrained, *words) == 4
+    assert "is y the direction that points up?" in capsys.readouterr().err
+
+
+def test_strict_takes_no_doubt_and_the_result_is_written(taught, untrained, capsys):
+    write_cloud(taught / "new.ply", PointCloud(1000 * cloud(seed=1).points))
+    assert transfer(taught, untrained) == 0
+    assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
+    assert transfer(taught, untrained, "--strict", "--overwrite") == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "nrdf: doubtful, with --strict:" in said and "taken to be mm" in said
+    doubts = json.loads((taught / "job" / "report.json").read_text())["doubts"]
+    assert "taken to be mm" in doubts[0] and (taught / "job" / "toolpaths.json").exists()
+
+
+def test_a_placeholder_says_what_to_do(files, capsys):
+    words = f"knowledge new --reference {files}/box.ply --category chair --out {files}/box.yaml"
+    assert cli.run(words.split()) == 0
+    assert "my-region.ply" in capsys.readouterr().out
+    assert cli.run(["knowledge", "check", str(files / "box.yaml")]) == 2
+    assert "region 'my-region': cannot read" in capsys.readouterr().err
+    assert cli.run(words.split()) == 2
+    assert "exists; give another name, or --overwrite" in capsys.readouterr().err
+    assert cli.run([*words.split(), "--overwrite"]) == 0
+
+
+def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
+    path = taught / "box.yaml"
+    path.write_text(path.read_text().replace("edge_margin_m: 0.01", "edge_margin_m: 0.4", 1))
+    assert cli.run(["knowledge", "check", str(path)]) == 2
+    said = capsys.readouterr()
+    assert "region 'top', sand: edge_margin_m is 0.4, which leaves nothing" in said.err
+    assert "asked for" in said.out and "nothing is wrong" not in said.out
+
+
+def test_check_finds_a_category_that_no_model_is_for(taught, untrained, capsys):
+    path = taught / "box.yaml"
+    path.write_text(path.read_text().replace("category: chair", "category: chiar", 1))
+    assert cli.run(["knowledge", "check", str(path)]) == 2
+    assert "category: no model for the category 'chiar'; did you mean" in capsys.readouterr().err
+    assert cli.run(["knowledge", "check", str(path), "--model", str(untrained)]) == 2
+    assert "is for chair" in capsys.readouterr().err
+    text = path.read_text()
+    path.write_text(text.replace("allow_unusual: false", "allow_unusual: true", 1))
+    assert path.read_text() != text
+    assert cli.run(["knowledge", "check", str(path)]) == 0
+
+
+def test_new_takes_an_unusual_category_where_it_is_meant(files, capsys):
+    words = f"knowledge new --reference {files}/box.ply --category sofa --out {files}/sofa.yaml"
+    words += f" --region {files}/top.ply"
+    assert cli.run(words.split()) == 2
+    assert "--model" in capsys.readouterr().err and not (files / "sofa.yaml").exists()
+    assert cli.run([*words.split(), "--allow-unusual"]) == 0
+    assert cli.run(["knowledge", "check", str(files / "sofa.yaml")]) == 0
+
+
+def test_json_and_its_schema(taught, tmp_path, capsys):
+    words = f"knowledge new --reference {taught}/box.ply --category chair --out {taught}/box.json"
+    assert cli.run([*words.split(), "--region", str(taught / "top.ply")]) == 0
+    assert json.loads((taught / "box.json").read_text())["version"] == 1
+    assert read_knowledge(taught / "box.json").regions[0].name == "top"
+    capsys.readouterr()
+    assert cli.run(["knowledge", "schema"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    feed = schema["$defs"]["Process"]["properties"]["feed_m_s"]["description"]
+    assert feed.endswith("Plausible: 0.0001 to 5.")
+    assert schema["properties"]["regions"] and "2020-12" in schema["$schema"]
+    assert cli.run(["knowledge", "schema", "--out", str(tmp_path / "s.json")]) == 0
+    assert json.loads((tmp_path / "s.json").read_text()) == schema
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("feed_m_s: 0.1 ", "feed_m_s: 0 "), "process 1 (sand), feed_m_s: must be above 0.0"),
+        (("standoff_m: 0.0", "standoff_m: 0.1"), "a force without contact"),
+        (("version: 1", "version: 9"), "version 9, from a newer nrdf"),
+        (("category:", "catgeory:"), "unknown key 'catgeory'; did you mean 'category'?"),
+        (("sha256: ", "sha256: 0000"), "reference.sha256"),
+        (("category: chair", "category: table"), "for the category chair"),
+        (("file: top.ply", "file: front.ply"), "regions 'top' and 'front' overlap"),
+    ],
+)
+def test_bad_knowledge_is_explained_and_leaves_nothing(taught, untrained, capsys, change, message):
+    path = taught / "box.yaml"
+    text = path.read_text()
+    assert change[0] in text
+    path.write_text(text.replace(*change, 1))
+    assert transfer(taught, untrained) == 2
+    said = capsys.readouterr().err
+    assert message in said and "Traceback" not in said
+    assert not (taught / "job").exists()
+
+
+def test_the_targets_unit_is_asked_for_where_nothing_tells_it(taught, untrained, capsys):
+    write_cloud(taught / "new.ply", PointCloud(7 * cloud(seed=1).points))
+    assert transfer(taught, untrained) == 2
+    assert "give --unit (m, cm, mm, in)" in capsys.readouterr().err
+    assert transfer(taught, untrained, "--unit", "in") == 0
+    write_cloud(taught / "new.ply", PointCloud(cloud(seed=1).points, unit="m"))
+    assert transfer(taught, untrained, "--unit", "mm", "--overwrite") == 2
+    assert "--unit is mm, but the file says m" in capsys.readouterr().err
+
+
+def test_a_region_marked_on_the_target_is_taken_instead_of_what_is_found(taught, untrained, capsys):
+    new = cloud(SIZE, seed=1)
+    chosen = faces(new)["top"][:200]
+    (taught / "marked").mkdir()
+    marked = taught / "marked" / "top.ply"
+    write_cloud(marked, PointCloud(1000 * new.points[chosen], None, "mm"))
+    assert transfer(taught, untrained, "--region", str(marked)) == 0
+    report = json.loads((taught / "job" / "report.json").read_text())
+    top = report["regions"]["top"]
+    assert top["confidence"] == 1.0 and top["points"] == 200
+    assert report["regions"]["front"]["confidence"] < 1.0
+    marked.rename(taught / "marked" / "lid.ply")
+    words = ("--region", str(taught / "marked" / "lid.ply"), "--overwrite")
+    assert transfer(taught, untrained, *words) == 2
+    assert "no taught region 'lid'; known: top, front" in capsys.readouterr().err

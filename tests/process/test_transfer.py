@@ -1,0 +1,273 @@
+"""Transfer from a box to a box: an untrained field knows that one is the other."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import nrdf
+from builders.taught_box import SAND, SIZE, cloud, faces, lesson
+from nrdf.errors import CloudError, ModelError
+from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.similarity import Similarity
+from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.transfer import ProcessTransfer, working
+from nrdf.process.warp import carry
+from nrdf.reports.transfer_report import measure_warnings
+
+OFFSET = np.array([3.0, -1.0, 0.5])
+OIL = {**SAND, "kind": "oil", "order": -1, "parameters": {"oil": "linseed"}}
+TAUGHT = {
+    **SAND, "name": "seam", "trajectory": "taught",
+    "waypoints": [{"positions_m": [[0.25, 0.1, z] for z in np.linspace(-0.3, 0.3, 13).tolist()]}],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model(untrained):
+    return nrdf.load_model(untrained)
+
+
+@pytest.fixture(scope="module")
+def transferred(model):
+    taught = lesson({"top": [SAND, {**SAND, "transfer": "carry", "passes": 2}],
+                     "right": [OIL], "front": [TAUGHT]})  # fmt: skip
+    return ProcessTransfer(taught, model).transfer(cloud(seed=1))
+
+
+def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(model, transferred):
+    turn = Rotation.from_rotvec([0.4, -1.1, 0.7])
+    target = cloud(seed=1)
+    moved = PointCloud(turn.apply(target.points) + OFFSET, turn.apply(target.normals), unit="m")
+    centre, scale = canonical_transform(target.points)
+    pose = Similarity(turn.as_matrix(), turn.apply(centre) + OFFSET, scale)
+    job = ProcessTransfer(transferred.lesson, model).transfer(model.embed(moved, pose))
+    assert [step.reason for step in job.paths] == ["", "", "", ""]
+    for step, turned in zip(transferred.paths, job.paths, strict=True):
+        if step.way != "carry":  # planning breaks ties of direction by the target's axes
+            continue
+        for segment, there in zip(process_segments(step), process_segments(turned), strict=True):
+            np.testing.assert_allclose(
+                turn.apply(segment.positions) + OFFSET, there.positions, atol=2e-3
+            )
+            apart = Rotation.from_quat(there.quaternions_xyzw).inv() * (
+                turn * Rotation.from_quat(segment.quaternions_xyzw)
+            )
+            assert np.degrees(apart.magnitude().max()) < 3
+    for step in job.paths:
+        positions = np.concatenate([segment.positions for segment in process_segments(step)])
+        back = np.abs(turn.inv().apply(positions - OFFSET))
+        assert (np.abs(back - SIZE / 2).min(axis=1) < 0.01).all()
+
+
+def test_a_target_may_be_a_file_or_an_array(model, tmp_path):
+    teacher = ProcessTransfer(lesson({"top": [SAND]}), model)
+    target = cloud(seed=1)
+    write_cloud(tmp_path / "new.ply", target)
+    from_file = teacher.transfer(tmp_path / "new.ply")
+    np.testing.assert_array_equal(from_file.target.points, target.points)
+    from_array = teacher.transfer(target.points, unit="m")
+    np.testing.assert_array_equal(from_array.target.points, target.points)
+    with pytest.raises(CloudError, match=r"the target cannot be dict.*accepted are"):
+        teacher.transfer({})
+
+
+def process_segments(step):
+    return [segment for segment in step.path.segments if segment.kind == "process"]
+
+
+def test_processes_come_in_their_order(transferred):
+    steps = [(step.region, step.number, step.process.label) for step in transferred.paths]
+    assert steps == [("right", 0, "oil"), ("top", 0, "sand"), ("top", 1, "sand 2"),
+                     ("front", 0, "seam")]  # fmt: skip
+    assert all(step.path is not None and not step.reason for step in transferred.paths)
+    assert set(transferred.seconds) == {"regions", "surface", "tool paths"}
+
+
+def test_regions_are_those_of_the_target(transferred):
+    truth = faces(transferred.target)
+    for name, region in transferred.regions.items():
+        assert not region.missing
+        common = np.intersect1d(region.match.indices, truth[name])
+        assert len(common) > 0.9 * max(len(region.match.indices), len(truth[name]))
+
+
+def test_a_strategy_is_planned_anew_on_the_target(transferred):
+    step = transferred.paths[1]
+    assert step.way == "replan" and step.process.trajectory == "raster"
+    positions = np.concatenate([segment.positions for segment in process_segments(step)])
+    np.testing.assert_allclose(positions[:, 1], SIZE[1] / 2, atol=2e-3)
+    assert step.measures.coverage > 0.9
+    assert (step.path.process, step.path.tool_radius_m) == ("sand", 0.025)
+    assert process_segments(step)[0].force_n == 10
+
+
+def test_a_carried_strategy_has_the_references_lines(transferred):
+    step = transferred.paths[2]
+    assert step.way == "carry" and step.process.trajectory == "taught"
+    assert step.process.transfer is None and step.process.way == "carry"
+    once = len(step.process.waypoints)
+    assert len(process_segments(step)) == 2 * once >= 10
+    first = np.array(step.process.waypoints[0].positions_m)
+    np.testing.assert_allclose(process_segments(step)[0].positions, first)
+
+
+def test_taught_waypoints_are_carried_and_get_their_tools(transferred):
+    step = transferred.paths[3]
+    (segment,) = process_segments(step)
+    given = np.array(TAUGHT["waypoints"][0]["positions_m"])
+    np.testing.assert_allclose(segment.positions, given, atol=0.01)
+    assert step.path.parameters == {} and step.path.process == "seam"
+    kinds = [segment.kind for segment in step.path.segments]
+    assert kinds == ["approach", "process", "retract"]
+
+
+def test_free_parameters_go_along(transferred):
+    assert transferred.paths[0].path.parameters == {"oil": "linseed"}
+
+
+def test_a_direction_is_in_the_targets_frame(model):
+    turned = lesson({"top": [{**SAND, "direction": [0, 0, 1]}]})
+    step = ProcessTransfer(turned, model).transfer(cloud(seed=1)).paths[0]
+    assert abs(step.process.direction[2]) > 0.99
+    line = process_segments(step)[1].positions
+    assert np.ptp(line[:, 2]) > 5 * np.ptp(line[:, 0])
+
+
+def test_a_region_that_is_not_there_is_skipped_never_invented(model):
+    taught = ProcessTransfer(lesson({"top": [SAND, OIL], "right": [SAND]}), model)
+    result = taught.transfer(cloud(seed=1), min_confidence=1.0)
+    assert all(step.path is None and step.measures is None for step in result.paths)
+    assert ", below 1" in result.regions["top"].missing
+    assert len(result.warnings) == 2
+    assert result.warnings[0].startswith("region 'top' is skipped: confidence ")
+
+
+def test_a_process_that_does_not_fit_the_target_is_left_out_with_the_reason(model):
+    wide = {**SAND, "edge_margin_mm": 100}
+    small = ProcessTransfer(lesson({"top": [wide, SAND]}), model).transfer(cloud(SIZE / 4, seed=1))
+    assert small.paths[0].path is None
+    assert "edge_margin_m is 0.1" in small.paths[0].reason
+    assert small.paths[1].path is not None
+
+
+def test_waypoints_off_the_reference_are_named(model):
+    far = {**TAUGHT, "waypoints": [{"positions_m": [[0.25, 0.1, 0.0], [0.45, 0.1, 0.0]]}]}
+    step = ProcessTransfer(lesson({"front": [far]}), model).transfer(cloud(seed=1)).paths[0]
+    assert "number 2 of line 1 is 1" in step.reason and "standoff_m 0" in step.reason
+
+
+def test_regions_that_overlap_on_the_target_are_said(model):
+    reference = cloud()
+    taught = lesson({"top": [SAND], "right": [SAND]}, reference, allow_overlap=True)
+    both = np.union1d(taught.regions["right"], taught.regions["top"])
+    changed = {**taught.regions, "right": both}
+    taught = type(taught)(taught.knowledge, reference, changed)
+    result = ProcessTransfer(taught, model).transfer(cloud(seed=1))
+    assert any("regions 'top' and 'right' overlap" in line for line in result.warnings)
+
+
+def test_paths_are_judged_by_the_mesh_that_was_given(model):
+    """Its points lie 5 mm outside of the box: planned on them, all is well."""
+    target = cloud(seed=1)
+    box = trimesh.creation.box(SIZE - 0.01)
+    mesh = Mesh(np.array(box.vertices), np.array(box.faces))
+    (step,) = (
+        ProcessTransfer(lesson({"top": [SAND]}), model).transfer(replace(target, mesh=mesh)).paths
+    )
+    assert step.measures.judged_by == "the mesh as given (12 triangles)"
+    assert step.measures.surface_distance_99_m < 1e-3
+    assert step.measures.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
+    assert step.measures.true_distance_worst_m >= step.measures.true_distance_95_m
+    (warning,) = (w for w in measure_warnings(step.process, step.measures) if "as given" in w)
+    assert re.match(r"1 % of the way on the surface is more than \d", warning)
+
+
+def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
+    """All points are 4 mm deeper on the top than those that a model works on."""
+    target = cloud(seed=1)
+    deeper = target.points - [0.0, 0.004, 0.0] * (target.normals[:, 1:2] > 0.5)
+    points = np.concatenate([deeper, deeper + 1e-4])
+    whole = PointCloud(points, np.concatenate([target.normals] * 2))
+    teacher = ProcessTransfer(lesson({"top": [SAND]}), model)
+    (step,) = teacher.transfer(target, whole=whole).paths
+    assert step.measures.judged_by == f"all {2 * len(target)} points as given"
+    assert step.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+    (alone,) = teacher.transfer(target).paths
+    assert alone.measures.judged_by == f"all {len(target)} points as given"
+    assert alone.measures.true_distance_95_m < 1e-3
+    (bare,) = teacher.transfer(target, whole=PointCloud(points)).paths  # without normals
+    assert bare.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+
+
+def test_a_carried_step_that_grew_is_said(model, monkeypatch):
+    def torn(way, lines, radius):
+        carried, lost = carry(way, lines, radius)
+        first = carried[0]
+        keep = np.r_[0:2, len(first.positions) - 1]
+        parts = {n: getattr(first, n)[keep] for n in ("positions", "quaternions_xyzw", "normals")}
+        return (replace(first, **parts), *carried[1:]), lost
+
+    teacher = ProcessTransfer(lesson({"front": [TAUGHT]}), model)
+    (step,) = teacher.transfer(cloud(seed=1)).paths
+    assert not any("a step of" in warning for warning in step.warnings)
+    monkeypatch.setattr("nrdf.process.transfer.carry", torn)
+    (step,) = teacher.transfer(cloud(seed=1)).paths
+    (warning,) = (w for w in step.warnings if "a step of" in w)
+    assert re.match(
+        r"a step of 5\d\d.* mm between .* the longest on the reference is 50 mm", warning
+    )
+
+
+def test_a_model_of_another_category_is_refused(model):
+    table = lesson({"top": [SAND]}, category="table")
+    with pytest.raises(ModelError, match="for the category chair, but the knowledge is about"):
+        ProcessTransfer(table, model)
+
+
+def test_normals_are_estimated_for_all_points_and_kept(model):
+    whole = cloud(seed=1)
+    result = ProcessTransfer(lesson({"top": [SAND]}), model).transfer(PointCloud(whole.points))
+    facing = np.einsum("na,na->n", result.target.normals, whole.normals)
+    assert np.quantile(facing, 0.2) > 0.9
+    assert result.paths[0].measures.coverage > 0.9
+
+
+def test_a_target_in_another_unit_is_brought_to_metres(model):
+    there = cloud(seed=1)
+    far = PointCloud(1000 * there.points + 5000, there.normals, unit="mm", frame="cell")
+    result = ProcessTransfer(lesson({"top": [SAND]}), model).transfer(far)
+    assert (result.target.unit, result.target.frame) == ("m", "cell")
+    positions = np.concatenate([s.positions for s in process_segments(result.paths[0])])
+    np.testing.assert_allclose(positions[:, 1], 5 + SIZE[1] / 2, atol=5e-3)
+
+
+def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
+    write_cloud(tmp_path / "box.ply", cloud())
+    write_knowledge(tmp_path / "box.yaml", lesson({"top": [SAND]}).knowledge)
+    teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
+    teacher.transfer(cloud(seed=1)).write(tmp_path / "job")
+    assert (tmp_path / "job" / "report.html").exists()
+    assert teacher.lesson.knowledge.regions[0].name == "top"
+
+
+def test_points_in_use_are_found_again(model):
+    embedded = model.embed(cloud(count=20_000))
+    some = np.arange(0, 20_000, 3)
+    found = working(embedded, some)
+    np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
+
+
+def test_taught_spots_are_carried_one_by_one(model):
+    spots = [{"positions_m": [[0.25, 0.1, z]]} for z in (-0.2, 0.0, 0.2)]
+    taught = lesson({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
+    step = ProcessTransfer(taught, model).transfer(cloud(seed=1)).paths[0]
+    assert step.reason == "" and [len(s.positions) for s in process_segments(step)] == [1, 1, 1]
+    assert step.measures.cycle_time_s > 6.0

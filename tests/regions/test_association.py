@@ -1,0 +1,66 @@
+"""Nearest neighbours in position and normal, against all distances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from builders.solids import box
+from nrdf.regions.association import snap, voters
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    mapped, mapped_normals = box((1.0, 0.6, 0.4), 150)
+    target, target_normals = box((0.9, 0.7, 0.4), 220, seed=1)
+    return mapped, mapped_normals, target, target_normals
+
+
+def all_distances(mapped, mapped_normals, target, target_normals, weight):
+    """(m, n)"""
+    place = ((mapped[:, None] - target) ** 2).sum(-1)
+    turn = ((mapped_normals[:, None] - target_normals) ** 2).sum(-1)
+    return np.sqrt(place + weight**2 * turn)
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.1, 1.0])
+def test_snap_is_the_nearest_target_point(clouds, weight):
+    index, distance = snap(*clouds, weight)
+    expected = all_distances(*clouds, weight)
+    assert index.shape == distance.shape == (150,)
+    np.testing.assert_allclose(distance, expected.min(1), atol=1e-12)
+    np.testing.assert_allclose(expected[np.arange(150), index], expected.min(1), atol=1e-12)
+
+
+@pytest.mark.parametrize(("weight", "count"), [(0.1, 7), (0.5, 1), (0.0, 3)])
+def test_voters_are_the_nearest_mapped_points(clouds, weight, count):
+    index, distance = voters(*clouds, weight, count)
+    assert index.shape == distance.shape == (220, count)
+    expected = np.sort(all_distances(*clouds, weight).T, axis=1)[:, :count]
+    np.testing.assert_allclose(distance, expected, atol=1e-12)
+    own = all_distances(*clouds, weight).T[np.arange(220)[:, None], index]
+    np.testing.assert_allclose(own, expected, atol=1e-12)
+
+
+def test_no_more_voters_than_there_are(clouds):
+    mapped, mapped_normals, target, target_normals = clouds
+    index, distance = voters(mapped[:4], mapped_normals[:4], target, target_normals, 0.1, 7)
+    assert index.shape == (220, 4) and np.isfinite(distance).all()
+    assert (np.sort(index, axis=1) == np.arange(4)).all()
+
+
+def test_normals_tell_the_two_sides_of_a_thin_plate_apart():
+    plate, normals = box((1.0, 0.01, 1.0), 1500)
+    # Its lower side is nearly where the plate's upper side is.
+    other, other_normals = box((1.0, 0.01, 1.0), 1500, seed=1, centre=(0.0, 0.008, 0.0))
+    faces, other_faces = np.abs(normals[:, 1]) > 0.5, np.abs(other_normals[:, 1]) > 0.5
+
+    def agreement(weight):
+        index, _ = snap(plate, normals, other, other_normals, weight)
+        asked, _ = voters(plate, normals, other, other_normals, weight, 5)
+        snapped = (other_normals[index] == normals).all(1)[faces]
+        voted = (normals[asked] == other_normals[:, None]).all(2)[other_faces]
+        return snapped.mean(), voted.mean()
+
+    assert min(agreement(0.1)) > 0.98
+    assert max(agreement(0.0)) < 0.8

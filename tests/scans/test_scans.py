@@ -1,0 +1,110 @@
+"""The benchmark of scans: its truth, its figures, its command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import nrdf
+from nrdf import cli
+from nrdf.errors import DataError
+from nrdf.regions.match import Match
+from nrdf.regions.presence import ABSENT, Presence
+from nrdf.scans.pose_scorer import PoseScorer
+from nrdf_benchmark import scans
+
+
+@pytest.fixture(scope="module")
+def judge():
+    return PoseScorer(nrdf.load_model("car"))
+
+
+def test_poses_of_an_item_are_scored_the_same_every_time(judge):
+    (item,) = scans.members("car", 1)
+    figures = [scans.score_pose(judge, item, kind) for kind in ("full", "3 views")]
+    assert [f.kind for f in figures] == ["full", "3 views"]
+    for figure in figures:
+        assert figure.yaw < 5 and figure.scale < 0.03 and figure.source == "family"
+        assert figure.seconds > 0 and figure.processor_seconds > 0
+    assert figures[0].points == scans.CLOUD_POINTS < figures[1].points
+    again = scans.score_pose(judge, item, "full")
+    assert (again.yaw, again.scale) == (figures[0].yaw, figures[0].scale)
+
+
+def test_regions_of_a_pair_are_scored_in_every_kind_of_scan(judge):
+    figures = scans.score_regions(judge, "car", 0)
+    assert {f.kind for f in figures} == {"canonical", *scans.KINDS}
+    there = [f for f in figures if f.state == "there"]
+    assert all(np.isnan(f.cd_l1) == (f.state != "there") for f in figures)
+    full = {f.region: f.cd_l1 for f in there if f.kind == "full"}
+    canonical = {f.region: f.cd_l1 for f in there if f.kind == "canonical"}
+    assert set(full) == set(canonical) and max(canonical.values()) < 0.2
+    assert np.mean(list(full.values())) < 1.5 * np.mean(list(canonical.values()))
+
+
+def test_truth_is_there_absent_or_hidden():
+    points = np.random.default_rng(0).random((1000, 3))
+    labels = np.array(["seat"] * 400 + [""] * 400 + ["floor"] * 200)
+    share = {"seat": 0.5, "arm": 0.0, "back": 0.2, "leg": 0.02}
+    nothing = Match(
+        np.empty(0, int), points[:1], np.empty(0), "mask", Presence(ABSENT, 0.9, 0.1, 0.0)
+    )
+    found = Match(np.arange(400), points[:1], np.ones(400), "mask")
+    matches = {"seat": found, "arm": nothing, "back": nothing, "leg": nothing}
+    figures = {f.region: f for f in scans._compare("1 view", 3, matches, points, labels, share)}
+    assert {name: f.state for name, f in figures.items()} == {
+        "seat": "there", "arm": "absent", "back": "hidden", "leg": "hidden"
+    }  # fmt: skip
+    assert figures["seat"].cd_l1 == 0 and figures["arm"].reason == ABSENT
+    whole = [replace(figures["seat"], kind="canonical", region=r, cd_l1=c)
+             for r, c in (("seat", 0.02), ("back", 0.04))]  # fmt: skip
+    every = [*figures.values(), *whole]
+    rows = {(kind, what): value for kind, what, value, _ in scans.summary([], every)}
+    assert rows["canonical", "CD-L1"] == pytest.approx(0.03)
+    assert rows["1 view", "CD-L1"] == 0 and rows["1 view", "the same regions canonical"] == 0.02
+    assert rows["1 view", "absent, reported absent"] == 1
+    assert rows["1 view", "not seen, returned empty"] == 1
+    assert rows["1 view", "there, reported absent"] == 0
+
+
+def test_poses_are_summed_up_by_kind_and_source():
+    def figure(yaw, source, doubted):
+        return scans.PoseFigure("1 view", source, "", yaw, 0.01, doubted, 1.0, 1.0, 10)
+
+    poses = [figure(1, "family", False), figure(179, "family", True), figure(2, "mesh", False)]
+    rows = {(kind, what): value for kind, what, value, _ in scans.summary(poses, [])}
+    assert rows["1 view", "family: yaw within 5°"] == 0.5
+    assert rows["1 view", "mesh: yaw within 5°"] == 1
+    assert rows["1 view", "wrong poses that were doubted"] == 1
+    assert rows["1 view", "right poses that were doubted"] == 0
+
+
+def test_the_command_scores_meshes_and_writes_every_figure(tmp_path, capsys):
+    import trimesh
+
+    body = trimesh.util.concatenate([
+        trimesh.creation.box((1.0, 0.15, 0.4)),
+        trimesh.creation.box((0.5, 0.15, 0.35), trimesh.transformations.translation_matrix(
+            (-0.1, 0.15, 0))),
+    ])  # fmt: skip
+    (tmp_path / "car").mkdir()
+    body.export(tmp_path / "car" / "box-car.ply")
+    (tmp_path / "index.csv").write_text("category,shape,split\ncar,box-car,test\ncar,other,train\n")
+    out = tmp_path / "scans.json"
+    words = ["eval", "scans", "--category", "car", "--members", "0", "--pairs", "0", "--meshes",
+             str(tmp_path), "--out", str(out)]  # fmt: skip
+    assert cli.run(words) == 0
+    assert "mesh: yaw within 5°" in capsys.readouterr().out
+    content = json.loads(out.read_text())
+    assert [p["name"] for p in content["poses"]] == ["box-car"] * 3
+
+
+def test_an_index_that_names_what_is_not_there_is_refused(tmp_path):
+    with pytest.raises(DataError, match="cannot read"):
+        list(scans.meshes(tmp_path, "car"))
+    (tmp_path / "index.csv").write_text("category,shape,split\ncar,gone,test\n")
+    with pytest.raises(DataError, match="lists 'gone', but car/gone"):
+        list(scans.meshes(tmp_path, "car"))

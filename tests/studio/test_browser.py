@@ -1,0 +1,356 @@
+"""The studio in a real browser: all steps, as a person takes them by what the page says.
+
+Screenshots of every step are left in build/studio/.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
+pytest.importorskip("playwright", reason="pip install playwright")
+
+from playwright import sync_api
+
+import nrdf
+from nrdf.bundled import bundled_chair
+from nrdf.process.bound_knowledge import read_bound_knowledge
+from nrdf.studio.app import Studio
+from nrdf.studio.computing import SeparateComputing
+from nrdf.studio.document import REFERENCE
+from nrdf.studio.mouse import view_of
+from nrdf.studio.serving import open_server
+from nrdf.studio.session import Session
+from nrdf.toolpath.types import read_job
+
+SHOTS = Path(__file__).parents[2] / "build" / "studio"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-first-run",
+    "--webgl-antialiasing-mode=none", "--webgl-msaa-sample-count=0",
+)  # fmt: skip
+PATIENCE_S = 60.0
+SELDOM = """
+const draw = window.requestAnimationFrame;
+window.requestAnimationFrame = (frame) => setTimeout(() => draw(frame), 80);
+window.cancelAnimationFrame = (waiting) => clearTimeout(waiting);
+"""
+"""Few frames a second: drawing without a graphics card is most of this test's processor time."""
+
+
+def browser_path() -> str:
+    """The browser of this machine, or a skip."""
+    known = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    if known is None:
+        pytest.skip("no browser: apt-get install chromium, or CHROMIUM=/path/to/chromium")
+    return known
+
+
+def until(condition, what: str, seconds: float = PATIENCE_S) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not happen in {seconds} s"
+        time.sleep(0.02)
+
+
+class Person:
+    """Does what the page says, by labels; `studio` is only looked at."""
+
+    def __init__(self, page, studio: Studio) -> None:
+        self.page, self.studio, self.shots = page, studio, 0
+        self.told: list[tuple[str, str]] = []
+        tell = studio.tell
+
+        def heard(title: str, body: str, bad: bool = True) -> None:
+            self.told.append((title, body))
+            tell(title, body, bad)
+
+        studio.tell = heard
+
+    def step(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name).click()
+
+    def press(self, name: str) -> None:
+        self.page.get_by_role("button", name=name, exact=True).last.click()
+
+    def take(self, tool: str) -> None:
+        """Another tool; the page says when it is in the hand."""
+        self.press(tool)
+        self.reads(f"In your hand: {tool}")
+
+    def field(self, label: str):
+        shown = "input[not(@type='hidden')]"
+        return self.page.locator(
+            f"xpath=((//label[.='{label}'])[1]/ancestor::*[.//{shown}][1]//{shown})[last()]"
+        )
+
+    def write(self, label: str, value: str) -> None:
+        self.field(label).fill(value)
+        self.field(label).press("Enter")
+
+    def choose(self, label: str, value: str) -> None:
+        self.field(label).click()
+        option = self.page.get_by_role("option", name=value, exact=True)
+        option.locator("visible=true").click()
+
+    def place_of(self, key: str, index: int) -> tuple[float, float]:
+        """Where a shown point of an object is on the screen."""
+        client = next(iter(self.studio.server.get_clients().values()))
+        figure = self.studio.stage.figures[key]
+        place = figure.view(view_of(client)).project(figure.body.points[[index]])[0][0]
+        box = self.page.locator("canvas").first.bounding_box()
+        return box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"]
+
+    def click_on(self, key: str, index: int, done) -> None:
+        """Click a point of an object until it is `done`."""
+
+        def click() -> None:
+            self.page.mouse.move(*self.place_of(key, index))
+            self.page.mouse.down()
+            time.sleep(0.05)
+            self.page.mouse.up()
+
+        self._until_done(click, done, f"clicking {key}")
+
+    def drag_on(self, key: str, first: int, last: int, done) -> None:
+        """Drag from a point of an object to another one until it is `done`."""
+
+        def drag() -> None:
+            start, stop = np.array([self.place_of(key, i) for i in (first, last)])
+            self.page.mouse.move(*start)
+            self.page.mouse.down()
+            for share in (0.3, 0.65, 1.0):
+                self.page.mouse.move(*(start + share * (stop - start)))
+            self.page.mouse.up()
+
+        self._until_done(drag, done, f"dragging on {key}")
+
+    def _until_done(self, act, done, what: str) -> None:
+        """Do it again: a busy browser may miss what the mouse does."""
+        for _ in range(5):
+            act()
+            end = time.monotonic() + 0.2 * PATIENCE_S
+            while time.monotonic() < end:
+                if done():
+                    return
+                time.sleep(0.02)
+        raise AssertionError(f"{what} did nothing; said: {self.told}")
+
+    def new_region(self, name: str) -> None:
+        count = len(self.studio.desk.document.regions)
+        self.press("New region")
+        until(lambda: len(self.studio.desk.document.regions) > count, "the region")
+        sync_api.expect(self.field("Name")).to_have_value("region-1")
+        self.write("Name", name)
+        until(lambda: self.studio.region == name, "the name")
+
+    def reads(self, text: str) -> None:
+        self.page.get_by_text(text).first.wait_for(timeout=1e3 * PATIENCE_S)
+
+    def close_notes(self) -> None:
+        """Close the notifications, which lie over the objects."""
+        notes = self.page.locator(".mantine-Notification-closeButton")
+        until(lambda: notes.count() > 0, "a notification")
+        while notes.count():
+            with contextlib.suppress(sync_api.Error):
+                notes.first.click(timeout=5e3)
+
+    def shoot(self, name: str) -> None:
+        self.shots += 1
+        self.page.screenshot(path=SHOTS / f"{self.shots}-{name}.png", timeout=60e3)
+
+    def planned(self, region: str) -> bool:
+        painted = self.studio.desk.document.region(region)
+        plan = None if painted is None else self.studio.bench.plan(painted, 0)
+        return plan is not None and plan.checked is not None and not plan.fault
+
+
+@pytest.fixture
+def studio(tmp_path):
+    server = open_server("127.0.0.1", 8480)
+    computing = SeparateComputing(nrdf.load_model)
+    made = Studio(Session(tmp_path / "session"), server, computing, ["chair"], {})
+    yield made
+    made.stop()
+    server.stop()
+
+
+@pytest.fixture
+def person(studio):
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_path(), args=list(FLAGS))
+        page = browser.new_page(viewport={"width": 820, "height": 560}, accept_downloads=True)
+        page.set_default_timeout(1e3 * PATIENCE_S)
+        page.add_init_script(SELDOM)
+        page.goto(f"http://127.0.0.1:{studio.server.get_port()}")
+        person = Person(page, studio)
+        yield person
+        page.screenshot(path=SHOTS / "last.png")
+        browser.close()
+
+
+def middle_of(name: str, region: str) -> int:
+    """The point in the middle of a bundled chair's region."""
+    cloud, regions = bundled_chair(name)
+    points = cloud.points[regions[region]]
+    nearest = np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))
+    return int(np.flatnonzero(regions[region])[nearest])
+
+
+def test_all_steps(person, studio, tmp_path):
+    desk, page = studio.desk, person.page
+
+    # 1: a bundled chair; a file that is none is answered on the page.
+    person.step("1 Object")
+    bad = tmp_path / "notes.ply"
+    bad.write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
+    page.locator("input[type=file]").first.set_input_files(bad)
+    person.reads("notes.ply")
+    person.close_notes()
+    person.press("Open the bundled chair")
+    person.reads("8192 points")
+
+    # 2: two regions; the second by brush as well.
+    seat, back = (middle_of("reference", name) for name in ("seat", "back-front"))
+    person.step("2 Paint")
+    person.new_region("seat")
+    person.click_on(REFERENCE, seat, lambda: desk.document.region("seat").mask.any())
+    small = desk.document.region("seat").mask.sum()
+    person.write("Radius, mm", "190")
+    until(lambda: desk.document.region("seat").mask.sum() > 2 * small, "a wider patch")
+    truth = bundled_chair("reference")[1]
+    assert truth["seat"][desk.document.region("seat").mask].mean() > 0.9
+    person.new_region("back")
+    person.write("Radius, mm", "120")
+    until(lambda: studio.radius_m == 0.12, "the radius")
+    person.click_on(REFERENCE, back, lambda: desk.document.region("back").mask.any())
+    assert truth["back-front"][desk.document.region("back").mask].mean() > 0.9, "it went through"
+    person.take("Brush")
+
+    def size() -> int:
+        return int(desk.document.region("back").mask.sum())
+
+    grown = size()
+    above = int(np.argmin(np.linalg.norm(
+        desk.body(REFERENCE).points - desk.body(REFERENCE).points[back] - [-0.02, 0.15, 0], axis=1
+    )))  # fmt: skip
+    person.drag_on(REFERENCE, back, above, lambda: size() > grown)
+    brushed = size()
+    person.press("Undo")
+    until(lambda: size() < brushed, "undoing")
+    person.press("Redo")
+    until(lambda: size() >= brushed, "redoing")
+    person.shoot("regions")
+
+    # 3: another process on each, drawn at once; a wrong value is answered by field and value.
+    person.step("3 Process")
+    person.choose("What is done", "polish")
+    person.choose("Pattern", "spiral")
+    until(lambda: person.planned("back") and person.planned("seat"), "the plans")
+    person.write("Speed, mm/s", "-5")
+    person.reads("feed_m_s")
+    person.reads("-0.005")
+    person.write("Speed, mm/s", "80")
+    person.choose("Region", "seat")
+    person.take("Arrow")
+    behind = desk.body(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
+    behind = int(np.argmin(np.linalg.norm(desk.body(REFERENCE).points - behind, axis=1)))
+
+    def along() -> float:
+        return desk.document.region("seat").steps[0].get("direction", [0.0])[0]
+
+    person.drag_on(REFERENCE, behind, seat, lambda: along() > 0.9)
+    until(lambda: person.planned("back") and person.planned("seat"), "the plans")
+    person.reads("% missed")
+    person.shoot("process")
+
+    # 4: both on another chair; likeness; a doubtful region is painted by hand.
+    person.step("4 Targets")
+    person.press("Add the bundled chair")
+    until(lambda: "ladder-back" in studio.stage.figures, "the target")
+    person.press("Bring the process there")
+    until(lambda: studio.bench.is_current("ladder-back"), "the transfer")
+    found = studio.bench.results["ladder-back"].transferred
+    there = bundled_chair("ladder-back")[1]
+    assert there["seat"][found.regions["seat"].match.indices].mean() > 0.8
+    assert all(step.path is not None for step in found.paths)
+    person.reads("2 tool paths")
+    person.shoot("target")
+    person.take("Alike")
+    person.click_on(REFERENCE, seat, lambda: studio.colouring == "likeness")
+    before = studio.likeness("ladder-back")
+    person.drag_on(REFERENCE, seat, back, lambda: (studio.likeness("ladder-back") != before).any())
+    sync_api.expect(person.field("Colours")).to_have_value("likeness")
+    time.sleep(1.0)  # for the picture alone
+    person.shoot("likeness")
+    person.take("Grow")
+    there = middle_of("ladder-back", "seat")
+    person.click_on("ladder-back", there, lambda: desk.target("ladder-back").corrected)
+    until(lambda: studio.bench.is_current("ladder-back"), "the new tool path")
+    assert studio.bench.results["ladder-back"].transferred.regions["seat"].match.score == 1.0
+    person.choose("Colours", "confidence")
+    until(lambda: studio.colouring == "confidence", "the colours")
+
+    # 5: what is saved is what the command line reads.
+    person.step("5 Save")
+    with page.expect_download() as knowledge:
+        person.press("Knowledge file, with the reference")
+    assert knowledge.value.suggested_filename == "knowledge.zip"
+    lesson = read_bound_knowledge(desk.session.folder / "saved" / "knowledge" / "chair.yaml")
+    assert list(lesson.regions) == ["seat", "back"]
+    with page.expect_download() as report:
+        person.press("Report as one page")
+    assert b"<table>" in Path(report.value.path()).read_bytes()
+    job = read_job(desk.session.folder / "saved" / "ladder-back" / "job")
+    assert {path.process for path in job.paths} == {"sand", "polish"}
+    person.shoot("saved")
+
+    # 6: what is left of it, on an arm: simulated beside the page, played, moved by hand, put away.
+    if find_spec("mujoco") is not None:
+        person.choose("Region", "back")
+        person.step("2 Paint")
+        person.press("Delete")
+        until(lambda: desk.document.region("back") is None, "the deletion")
+        person.step("4 Targets")
+        person.press("Bring the process there")
+        until(lambda: studio.bench.is_current("ladder-back"), "the transfer")
+        person.step("6 Robot")
+        person.press("Simulate on the arm")
+        person.reads("simulating the arm on ladder-back")
+        until(lambda: studio.trial.playback is not None, "the simulation", 4 * PATIENCE_S)
+        person.reads("waypoints reached")
+        person.choose("Speed", "30 ×")
+        person.press("Play")
+        until(lambda: studio.trial.time_s > 0, "playing")
+        person.press("Pause")
+        until(lambda: not studio.trial.player.playing, "pausing")
+        work = studio.trial.playback.times[studio.trial.playback.doing == "process"]
+        person.write("Time, s", f"{work[len(work) // 2]:.1f}")
+        until(lambda: abs(studio.trial.time_s - work[len(work) // 2]) < 0.2, "moving by hand")
+        person.reads("at work")
+        time.sleep(1.0)  # for the picture alone
+        person.shoot("arm")
+        person.press("Simulate on the arm")
+        person.press("Cancel")
+        until(lambda: not studio.trial.worker.busy, "cancelling")
+        assert studio.trial.playback is not None, "the one before is kept"
+        person.field("Show the arm").click()
+        until(lambda: studio.shown() == [REFERENCE, "ladder-back"], "putting the arm away")
+
+    # Nothing is lost: the page, and the program, begun again.
+    page.reload()
+    person.reads("Your session is here") if desk.session.restored else person.reads("Next:")
+    kept = Session(desk.session.folder)
+    assert kept.restored and kept.document.regions[0].name == "seat"
+    assert (kept.document.region("seat").mask == desk.document.region("seat").mask).all()

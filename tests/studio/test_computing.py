@@ -1,0 +1,136 @@
+"""What computes in a process of its own: it answers, is given up, dies, and is started again."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
+
+import nrdf
+from builders.taught_box import SIZE, cloud, faces
+from nrdf.errors import CloudError
+from nrdf.io.cloud import write_cloud
+from nrdf.studio.app import Studio
+from nrdf.studio.computing import Computing, SeparateComputing
+from nrdf.studio.document import REFERENCE
+from nrdf.studio.editor import Desk
+from nrdf.studio.result_cache import Bench
+from nrdf.studio.serving import open_server
+from nrdf.studio.session import Session
+from nrdf.studio.worker import Cancelled
+
+
+def load(weights, deadly, category):
+    """The model of a category; ends the process instead as long as there is a file `deadly`."""
+    if deadly.exists():
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return nrdf.load_model(weights)
+
+
+def silent(done, total):
+    """Progress that nobody looks at."""
+
+
+def painted_desk(folder):
+    desk = Desk(Session(folder))
+    desk.open_reference("box.ply", cloud(), "chair")
+    desk.add_region("top")
+    mask = np.zeros(len(cloud()), bool)
+    mask[faces(cloud())["top"]] = True
+    desk.paint(REFERENCE, "top", mask)
+    desk.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+    return desk
+
+
+@pytest.fixture
+def deadly(tmp_path):
+    return tmp_path / "deadly"
+
+
+@pytest.fixture
+def separate(untrained, deadly):
+    made = SeparateComputing(partial(load, untrained, deadly))
+    yield made
+    made.end()
+
+
+def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
+    """One process for all that it does: starting it takes seconds."""
+    desk = painted_desk(tmp_path / "s")
+    here = Bench(desk, Computing(lambda category: nrdf.load_model(untrained)))
+    there = Bench(desk, separate)
+    document, shares = desk.document, []
+    for bench in (here, there):
+        bench.make_plans(document, silent)
+        bench.transfer(document, lambda done, total: shares.append(done / total))
+    (region,) = document.regions
+    one, other = here.plan(region, 0), there.plan(region, 0)
+    assert other.checked.measures == one.checked.measures and not other.fault
+    one, other = (bench.results["new"].transferred for bench in (here, there))
+    assert [p.measures for p in other.paths] == [p.measures for p in one.paths]
+    assert there.is_current("new") and max(shares) > 0.0
+    one, other = (bench.described(document, silent).unlike(17) for bench in (here, there))
+    np.testing.assert_allclose(other["new"], one["new"], atol=1e-6)
+    desk.change_numbers("top", 0, {"stepover_mm": 35.0})
+    assert not there.is_current("new")
+
+    def give_up(done, total):
+        raise Cancelled
+
+    with pytest.raises(Cancelled):
+        there.transfer(desk.document, give_up)
+    desk.change_numbers("top", 0, {"stepover_mm": 20.0})
+    there.transfer(desk.document, silent)
+    taught = there.results["new"].transferred.lesson.knowledge.regions[0].processes[0]
+    assert taught.stepover_m == 0.02, "what was changed after it was given up"
+
+    write_cloud(tmp_path / "box.ply", cloud())
+    content = (tmp_path / "box.ply").read_bytes()
+    read = there.read("box.ply", content, "chair", None, silent)
+    np.testing.assert_allclose(read.points, cloud().points)
+    with pytest.raises(CloudError, match=r"^box\.ply: "):
+        there.read("box.ply", content[:-100], "chair", None, silent)
+
+
+def test_a_studio_outlives_what_computes_and_opens_again(tmp_path, separate, deadly):
+    painted_desk(tmp_path / "s")
+    deadly.touch()
+    server = open_server("127.0.0.1", 8490)
+    studio = Studio(Session(tmp_path / "s"), server, separate, ["chair"], {})
+    try:
+        assert studio.worker.wait(120)
+        died = "has ended by itself (signal 11, Segmentation fault)"
+        until(lambda: died in studio.panel._trouble.content)
+        time.sleep(0.5)
+        assert not studio.worker.busy, "it does not try again by itself"
+        assert studio.bench.plan(studio.desk.document.regions[0], 0).lines, "planned before"
+        assert Session(tmp_path / "s").document.regions, "nothing is lost"
+        deadly.unlink()
+        with studio.answering():
+            studio.panel.targets._load(
+                SimpleNamespace(name="more.xyz", content=b"1 2 3\n" * 9),  # refused, in the process
+            )
+        assert studio.worker.wait(120)
+        until(lambda: "more.xyz" in studio.panel._trouble.content)
+        with studio.answering():
+            studio.transfer()
+        assert studio.worker.wait(120)
+        assert studio.bench.is_current("new")
+    finally:
+        studio.stop()
+        server.stop()
+
+
+def until(condition):
+    for _ in range(500):
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError("it did not come")

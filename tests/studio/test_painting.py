@@ -1,0 +1,118 @@
+"""Painting and looking: patches, mirror images, rays and rectangles."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from nrdf.bundled import bundled_chair
+from nrdf.studio.paintable_cloud import Body
+from nrdf.studio.view import View, hit, inside
+
+
+@pytest.fixture(scope="module")
+def chair():
+    cloud, regions = bundled_chair("reference")
+    return Body(cloud), regions
+
+
+def middle(body, mask):
+    points = body.points[mask]
+    return int(
+        np.flatnonzero(mask)[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+    )
+
+
+def test_a_patch_is_round_on_what_is_flat_and_does_not_go_through(chair):
+    body, regions = chair
+    seed = middle(body, regions["back-front"])
+    patch = body.canvas.patch(seed, 0.1)
+    away = np.linalg.norm(body.points - body.points[seed], axis=1)
+    front = regions["back-front"]
+    assert not (patch & regions["back-back"]).any()
+    assert patch[front & (away < 0.09)].all() and not patch[away > 0.1].any()
+
+
+def test_ways_lead_around_what_is_thin(chair):
+    body, regions = chair
+    seed = middle(body, regions["back-front"])
+    behind = regions["back-back"] & (np.linalg.norm(body.points - body.points[seed], axis=1) < 0.04)
+    assert behind.any() and (body.canvas.distances(seed, 0.15)[behind] > 0.15).all()
+
+
+def test_a_stroke_is_near_any_of_its_points(chair):
+    body, regions = chair
+    first = middle(body, regions["seat"])
+    second = middle(body, regions["back-front"])
+    both = body.canvas.patch([first, second], 0.05)
+    one, other = (body.canvas.patch(seed, 0.05) for seed in (first, second))
+    assert (both == (one | other)).all() and one.any() and other.any()
+
+
+def test_the_mirror_image_is_on_the_other_side(chair):
+    body, regions = chair
+    left = regions["armrests"] & (body.points[:, 2] < 0)
+    other = body.canvas.mirrored(left)
+    right = regions["armrests"] & (body.points[:, 2] > 0)
+    assert (other & right).sum() > 0.85 * right.sum()
+    assert (other & ~regions["armrests"]).sum() < 0.15 * right.sum()
+    assert not body.canvas.mirrored(np.zeros(len(left), bool)).any()
+
+
+def test_painting_8192_points_takes_less_than_100_ms(chair):
+    from nrdf.studio.colours import painted_colours
+
+    body, regions = chair
+    seed = middle(body, regions["seat"])
+    body.canvas.patch(seed, 0.2)
+    start = time.process_time()
+    patch = body.canvas.patch(seed, 0.2)
+    painted_colours(len(patch), [((200, 100, 0), np.flatnonzero(patch), None)])
+    assert time.process_time() - start < 0.05
+
+
+@pytest.fixture
+def from_the_front():
+    # Looks along -X from x = 2: right is -Z, up is +Y.
+    rotation = np.array([[0.0, 0, -1], [0, -1, 0], [-1, 0, 0]])
+    return View(np.array([2.0, 0.45, 0.0]), rotation, np.radians(48), 1.5)
+
+
+def test_rays_and_projection_agree(from_the_front):
+    points = np.array([[0.0, 0.9, 0.3], [0.5, 0.2, -0.4], [-0.3, 0.45, 0.0]])
+    places, depths = from_the_front.project(points)
+    for point, place, depth in zip(points, places, depths, strict=True):
+        ray = from_the_front.ray(tuple(place))
+        met = from_the_front.position + ray * np.linalg.norm(point - from_the_front.position)
+        np.testing.assert_allclose(met, point, atol=1e-9)
+        assert depth == pytest.approx(2.0 - point[0])
+    assert places[0][0] < 0.5 and places[0][1] < 0.5, "+Z is left, +Y up"
+
+
+def test_quaternions_come_scalar_first():
+    view = View.of(np.zeros(3), np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)]), 1.0, 1.0)
+    np.testing.assert_allclose(view.rotation @ [1.0, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+def test_a_ray_meets_the_side_that_faces_it(chair, from_the_front):
+    body, regions = chair
+    spacing = body.surface.spacing
+    target = body.points[middle(body, regions["back-front"])]
+    ray = target - from_the_front.position
+    ray /= np.linalg.norm(ray)
+    index, depth = hit(body.points, body.normals, from_the_front.position, ray, spacing)
+    assert regions["back-front"][index]
+    assert depth == pytest.approx(np.linalg.norm(target - from_the_front.position), abs=0.03)
+    assert hit(body.points, body.normals, from_the_front.position, -ray, spacing) is None
+
+
+def test_a_box_takes_what_is_seen_or_all(chair, from_the_front):
+    body, regions = chair
+    spacing, corners = body.surface.spacing, ((0.4, 0.45), (0.6, 0.02))
+    seen = inside(from_the_front, body.points, body.normals, corners, spacing)
+    every = inside(from_the_front, body.points, body.normals, corners, spacing, through=True)
+    assert (seen & regions["back-front"]).sum() > 0.9 * (every & regions["back-front"]).sum() > 100
+    assert (seen & regions["back-back"]).sum() < 0.02 * (every & regions["back-back"]).sum()
+    assert not (seen & ~every).any()
