@@ -9,8 +9,8 @@ from nrdf.bundled import KNOWLEDGE, bundled_chair
 teacher = nrdf.teach(KNOWLEDGE)  # chair.yaml: five regions of a reference, a process on each
 target, _ = bundled_chair("rocker")  # PointCloud, 8192 points in metres
 
-job = teacher.transfer(target)  # finds the regions, plans or carries the tool paths
-for step in job.paths:  # in the order in which they are driven
+result = teacher.transfer(target)  # finds the regions, plans or carries the tool paths
+for step in result.paths:  # in the order in which they are driven
     if step.path is None:
         print(f"{step.region:11s} {step.process.label:15s} left out: {step.reason}")
     else:
@@ -19,4 +19,4 @@ for step in job.paths:  # in the order in which they are driven
             f"{step.region:11s} {step.process.label:15s} {len(step.path.segments):4d} segments, "
             f"{step.measures.coverage:.1%} covered, {step.measures.cycle_time_s:.0f} s"
         )
-job.write("job", overwrite=True)  # what `nrdf transfer` writes; next: nrdf export job --format ...
+nrdf.write_job("job", result, overwrite=True)  # as `nrdf transfer` does; then: nrdf export job …

@@ -22,7 +22,7 @@ from nrdf.errors import OutputError
 from nrdf.export.registry import export_job
 from nrdf.io.locks import claim
 from nrdf.io.swap import MANIFEST
-from nrdf.toolpath.types import write_job
+from nrdf.toolpath.types import write_toolpaths
 
 LIMITED = """
 import resource, sys
@@ -35,7 +35,7 @@ sys.exit(cli.run(sys.argv[2:]))
 @pytest.fixture
 def job(tmp_path):
     (tmp_path / "job").mkdir()
-    write_job(tmp_path / "job", small_job())
+    write_toolpaths(tmp_path / "job", small_job())
     return tmp_path / "job"
 
 
@@ -53,9 +53,9 @@ import resource, sys
 from pathlib import Path
 from nrdf.errors import OutputError
 from nrdf.export.registry import FORMATS, export_job
-from nrdf.toolpath.types import read_job
+from nrdf.toolpath.types import read_toolpaths
 import rosbags.rosbag2
-job = read_job(sys.argv[1])
+job = read_toolpaths(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
 for name in FORMATS:
     try:

@@ -5,7 +5,8 @@
     match = taught.retrieve(region, "target.ply")  # or an array (n, 3), a mesh, ...
 
     teacher = nrdf.teach("chair.yaml")  # process knowledge: regions, and what is done on them
-    job = teacher.transfer("target.ply")
+    result = teacher.transfer("target.ply")
+    nrdf.write_job("job/", result)  # tool paths, report and pictures
 
 Everything is imported when it is first used, so `import nrdf` is cheap.
 """
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from nrdf.regions.match import Match
     from nrdf.regions.model import Model
     from nrdf.regions.reference import EncodedReference
+    from nrdf.reports.job_folder import write_job
     from nrdf.scans.target import align
 
 __all__ = [
@@ -66,6 +68,7 @@ __all__ = [
     "read_cloud",
     "teach",
     "write_cloud",
+    "write_job",
 ]
 
 __version__ = "0.1.0"
@@ -79,6 +82,7 @@ _HOMES = {
     **dict.fromkeys(("ProcessTransfer", "TransferResult"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     "align": "nrdf.scans.target",
+    "write_job": "nrdf.reports.job_folder",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
 

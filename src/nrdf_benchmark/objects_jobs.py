@@ -26,7 +26,8 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
 from nrdf.process.transfer import ProcessTransfer, TransferResult
-from nrdf.toolpath.types import read_job
+from nrdf.reports.job_folder import write_job
+from nrdf.toolpath.types import read_toolpaths
 from nrdf_benchmark.objects_match import Finder, Settings, finder
 
 SIZE_M = 0.9
@@ -83,11 +84,11 @@ def run_job(settings: Settings, reference: str, target: str) -> JobFigure:
                 done = teacher.transfer(cloud, "m")
             reasons = _missing(done, known, target)
             with timed("job folder"):
-                done.write(folder / _JOB, target)
+                write_job(folder / _JOB, done, target)
             with timed("programs"):
                 if all(step.path is None for step in done.paths):
                     raise ProcessError(f"no tool path: {'; '.join(reasons) or 'nothing found'}")
-                job = read_job(folder / _JOB)
+                job = read_toolpaths(folder / _JOB)
                 export_job(job, FORMATS, folder / _PROGRAMS)
                 paths = len(job.paths)
         except Exception as error:

@@ -14,7 +14,7 @@ from nrdf.process.bound_knowledge import bind
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
-from nrdf.reports.job_folder import write_transfer
+from nrdf.reports.job_folder import write_job_files
 from nrdf.shapes.families import get_family
 from nrdf_benchmark.latency import CATEGORY, POINTS, example
 
@@ -70,7 +70,7 @@ def measure_transfer(device: str = "cpu", repeats: int = 5) -> TransferSpeed:
         wall, cpu = time.perf_counter(), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
             done = teacher.transfer(target)
-            report = write_transfer(Path(folder), done, Limits(), "target", {})
+            report = write_job_files(Path(folder), done, Limits(), "target", {})
         walls.append(time.perf_counter() - wall)
         cpus.append(time.process_time() - cpu)
         phases.append({**report["seconds"], "files": walls[-1] - sum(report["seconds"].values())})

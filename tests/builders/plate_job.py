@@ -19,7 +19,7 @@ def write_job_on(folder, points, normals, region, segments):
     import nrdf
     from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
     from nrdf.process.knowledge_file import write_knowledge
-    from nrdf.toolpath.types import Job, write_job
+    from nrdf.toolpath.types import Job, write_toolpaths
 
     nrdf.write_cloud(folder / "target.ply", nrdf.PointCloud(points, normals, unit="m"))
     process = Process(
@@ -35,7 +35,7 @@ def write_job_on(folder, points, normals, region, segments):
     )
     write_knowledge(folder / "knowledge.yaml", knowledge)
     path = ToolPath("top", "sand", "disc", 0.025, tuple(segments))
-    write_job(folder, Job("chair", "target", (path,)))
+    write_toolpaths(folder, Job("chair", "target", (path,)))
     return folder
 
 

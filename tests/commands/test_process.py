@@ -13,7 +13,7 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import read_knowledge
-from nrdf.toolpath.types import read_job
+from nrdf.toolpath.types import read_toolpaths
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
         "min_coverage": 0.5, "require_all": True, "any_kind": True,
     }  # fmt: skip
     assert report["model"]["category"] == "chair" and report["versions"]["nrdf"]
-    job = read_job(taught / "job")
+    job = read_toolpaths(taught / "job")
     assert job.frame == "cell" and [path.process for path in job.paths] == ["sand", "oil"]
     assert max(abs(s.positions).max() for path in job.paths for s in path.segments) < 1.0
     assert cli.run(["export", str(taught / "job"), "--format", "urscript", "csv"]) == 0
@@ -69,11 +69,11 @@ def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, c
     assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
     report = json.loads((taught / "job" / "report.json").read_text())
     assert report["alignment"]["unit"] == {"name": "mm", "origin": "guessed"}
-    sand = next(path for path in read_job(taught / "job").paths if path.process == "sand")
+    sand = next(path for path in read_toolpaths(taught / "job").paths if path.process == "sand")
     heights = [s.positions[:, 2] for s in sand.segments if s.kind == "process"]
     assert np.abs(np.concatenate(heights) - 0.6).max() < 0.01
     # How it stands there goes along in the job, for whoever drives or draws it.
-    job = read_job(taught / "job")
+    job = read_toolpaths(taught / "job")
     np.testing.assert_allclose(job.up, [0, 0, 1], atol=0.02)
     assert report["pose"]["up"] == pytest.approx(job.up.tolist())
     corner = job.pose.to_scan(np.zeros((1, 3)))[0]

@@ -19,7 +19,7 @@ from nrdf.export.options import Options
 from nrdf.export.prepare import strokes
 from nrdf.export.registry import FORMATS, export_job
 from nrdf.io.swap import MANIFEST
-from nrdf.toolpath.types import Job, Segment, ToolPath, write_job
+from nrdf.toolpath.types import Job, Segment, ToolPath, write_toolpaths
 
 DOWN = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -296,7 +296,7 @@ def run(*words: str):
 
 
 def test_verb_writes_beside_the_job_unless_told_where(tmp_path, capsys):
-    write_job(tmp_path, small_job())
+    write_toolpaths(tmp_path, small_job())
     run(str(tmp_path), "--format", "csv", "krl", "--blend-mm", "0", "--process-only")
     out = tmp_path / "export"
     report = json.loads((out / "report.json").read_text())
@@ -315,7 +315,7 @@ def test_verb_writes_beside_the_job_unless_told_where(tmp_path, capsys):
 def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):
     with pytest.raises(ProcessError, match=r"cannot read the tool paths.*toolpaths\.json"):
         run(str(tmp_path), "--format", "csv", "--out", str(tmp_path / "out"))
-    path = write_job(tmp_path, small_job())
+    path = write_toolpaths(tmp_path, small_job())
     for words in (["--format", "csv", "krk"], ["--format", "csv", "krl", "--program", "if"]):
         with pytest.raises(ProcessError):
             run(str(tmp_path), *words, "--out", str(tmp_path / "out"))

@@ -21,7 +21,7 @@ from nrdf.export.registry import export_job
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.knowledge_file import write_knowledge
-from nrdf.toolpath.types import Job, Segment, ToolPath, read_job, write_job
+from nrdf.toolpath.types import Job, Segment, ToolPath, read_toolpaths, write_toolpaths
 
 WRITTEN = ("csv", "json", "urscript", "krl")
 
@@ -49,7 +49,7 @@ def job(tmp_path_factory):
     segment = Segment("process", 0, line, held, 0.1, 10.0)
     paths = tuple(ToolPath("top", name, "disc", 0.025, (segment,)) for name in names)
     pose = Similarity(upright(up_axis("z")), np.array([0.0, 0.0, 0.42]), 0.3)
-    write_job(folder, Job("chair", "target", paths, pose))
+    write_toolpaths(folder, Job("chair", "target", paths, pose))
     return folder
 
 
@@ -64,7 +64,7 @@ def changed(job, tmp_path, name, content):
 
 def use(folder):
     """What export and simulation do first with a job's folder."""
-    whole = read_job(folder)
+    whole = read_toolpaths(folder)
     out = folder.parent / "programs"
     shutil.rmtree(out, ignore_errors=True)
     export_job(whole, WRITTEN, out)

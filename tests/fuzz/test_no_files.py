@@ -11,7 +11,7 @@ from builders.fuzzing import message_of
 from builders.solids import box
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
-from nrdf.toolpath.types import read_job
+from nrdf.toolpath.types import read_toolpaths
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 
@@ -43,7 +43,7 @@ def test_is_refused_at_once(tmp_path, kind, said, place):
         "region": lambda: lesson(tmp_path, region=odd.name),
         "region array": lambda: lesson(tmp_path, region=odd.name),
         "knowledge": lambda: read_bound_knowledge(odd),
-        "job": lambda: read_job(odd),
+        "job": lambda: read_toolpaths(odd),
     }[place]
     message = message_of(call)
     assert "odd" in message and said in message

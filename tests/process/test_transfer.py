@@ -18,9 +18,9 @@ from nrdf.geometry.points import canonical_transform
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.transfer import ProcessTransfer, working
 from nrdf.process.warp import carry
-from nrdf.reports.transfer_report import measure_warnings
 
 OFFSET = np.array([3.0, -1.0, 0.5])
 OIL = {**SAND, "kind": "oil", "order": -1, "parameters": {"oil": "linseed"}}
@@ -253,7 +253,7 @@ def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
     write_cloud(tmp_path / "box.ply", cloud())
     write_knowledge(tmp_path / "box.yaml", lesson({"top": [SAND]}).knowledge)
     teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
-    teacher.transfer(cloud(seed=1)).write(tmp_path / "job")
+    nrdf.write_job(tmp_path / "job", teacher.transfer(cloud(seed=1)))
     assert (tmp_path / "job" / "report.html").exists()
     assert teacher.lesson.knowledge.regions[0].name == "top"
 

@@ -17,8 +17,8 @@ from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.check import check
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
-from nrdf.reports.job_folder import job_of, panel_of, write_transfer
-from nrdf.toolpath.types import read_job
+from nrdf.reports.job_folder import job_of, panel_of, write_job_files
+from nrdf.toolpath.types import read_toolpaths
 
 PAINT = {
     "kind": "paint", "stepover_mm": 60, "standoff_mm": 100, "tool": {"radius_mm": 40},
@@ -37,7 +37,7 @@ def transferred(untrained):
 def folder(transferred, tmp_path_factory):
     folder = tmp_path_factory.mktemp("job")
     origin = {"command": "nrdf transfer <x>", "model": {"name": "chair"}, "knowledge": "k.yaml"}
-    write_transfer(folder, transferred, Limits(max_cycle_time_s=0.0), "new & <old>", origin)
+    write_job_files(folder, transferred, Limits(max_cycle_time_s=0.0), "new & <old>", origin)
     return folder
 
 
@@ -51,7 +51,7 @@ def test_every_file_is_there_and_listed(folder):
 
 
 def test_the_job_is_read_again(folder, transferred):
-    job = read_job(folder)
+    job = read_toolpaths(folder)
     assert (job.category, job.frame) == ("chair", "target")
     assert [(path.region, path.process) for path in job.paths] == [
         ("top", "sand"), ("top", "oil"), ("right", "paint"),
@@ -65,8 +65,8 @@ def test_the_job_is_read_again(folder, transferred):
 def test_the_job_says_how_its_object_lies(transferred, tmp_path):
     """As for a scan that was given with z up: chairs must not lie on their side in the cell."""
     lying = Similarity(upright(up_axis("z")), np.array([1.0, 2.0, 3.0]), 0.9)
-    report = write_transfer(tmp_path, replace(transferred, pose=lying), Limits(), "scan", {})
-    job = read_job(tmp_path)
+    report = write_job_files(tmp_path, replace(transferred, pose=lying), Limits(), "scan", {})
+    job = read_toolpaths(tmp_path)
     np.testing.assert_allclose(job.pose.rotation, lying.rotation, atol=1e-12)
     np.testing.assert_allclose(job.pose.translation, lying.translation)
     assert job.pose.scale == 0.9
@@ -84,11 +84,11 @@ def test_processes_of_one_kind_on_one_region_keep_their_own_names(untrained, tmp
     result = teacher.transfer(cloud(seed=1))
     assert [step.process.label for step in result.paths] == ["sand", "sand 2", "sand 3", "paint"]
     assert result.paths[0].path is None
-    write_transfer(tmp_path, result, Limits(), "twice", {})
+    write_job_files(tmp_path, result, Limits(), "twice", {})
     made = read_bound_knowledge(tmp_path / "knowledge.yaml").knowledge.regions[0].processes
     feeds = {process.label: process.feed_m_s for process in made}
     assert feeds == {"sand 2": 0.1, "sand 3": 0.05, "paint": 0.3}
-    for path in read_job(tmp_path).paths:
+    for path in read_toolpaths(tmp_path).paths:
         work = [s for s in path.segments if s.kind == "process"]
         assert {s.feed_m_s for s in work} == {feeds[path.process]}
 
@@ -142,7 +142,7 @@ def test_the_picture_stands_upright_whatever_the_targets_frame(transferred):
 
 def test_nothing_found_is_a_report_all_the_same(tmp_path):
     skipped = made_up(missing="found nowhere on the target")
-    report = write_transfer(tmp_path, skipped, Limits(), "none", {})
+    report = write_job_files(tmp_path, skipped, Limits(), "none", {})
     assert report["total"]["paths"] == 0
     assert {path.name for path in tmp_path.iterdir()} == {
         "target.ply", "regions", "picture.png", "report.html", "report.json",

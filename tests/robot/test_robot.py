@@ -203,9 +203,9 @@ def test_a_urdf_keeps_its_speed_limits_and_says_which_meshes_are_missing(tmp_pat
 
 def test_a_folder_that_is_no_whole_job(tmp_path):
     from nrdf.robot.simulation.simulate import read_work
-    from nrdf.toolpath.types import Job, write_job
+    from nrdf.toolpath.types import Job, write_toolpaths
 
-    write_job(tmp_path, Job("chair", "target", (path_of(),)))
+    write_toolpaths(tmp_path, Job("chair", "target", (path_of(),)))
     with pytest.raises(ProcessError, match=r"has no knowledge\.yaml"):
         read_work(tmp_path)
 
@@ -230,7 +230,7 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
 def turned_job(job, folder, pose):
     """The plate's job, its object and tool paths, in another frame."""
     import nrdf
-    from nrdf.toolpath.types import read_job, write_job
+    from nrdf.toolpath.types import read_toolpaths, write_toolpaths
 
     def turned(segment):
         held = Rotation.from_matrix(pose.rotation) * Rotation.from_quat(segment.quaternions_xyzw)
@@ -243,9 +243,9 @@ def turned_job(job, folder, pose):
     nrdf.write_cloud(
         folder / "target.ply", replace(cloud, points=pose.to_scan(cloud.points), normals=normals)
     )
-    whole = read_job(job)
+    whole = read_toolpaths(job)
     paths = tuple(replace(p, segments=tuple(map(turned, p.segments))) for p in whole.paths)
-    write_job(folder, replace(whole, paths=paths, pose=pose))
+    write_toolpaths(folder, replace(whole, paths=paths, pose=pose))
     return folder
 
 
@@ -294,7 +294,7 @@ def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_t
 def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
     from nrdf.process.knowledge_file import read_knowledge, write_knowledge
     from nrdf.robot.simulation.simulate import read_work
-    from nrdf.toolpath.types import read_job, write_job
+    from nrdf.toolpath.types import read_toolpaths, write_toolpaths
 
     for name in ("target.ply", "knowledge.yaml"):
         (tmp_path / name).write_bytes((job / name).read_bytes())
@@ -307,15 +307,15 @@ def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
             tmp_path / "knowledge.yaml", knowledge.model_copy(update={"regions": [region]})
         )
 
-    whole = read_job(job)
+    whole = read_toolpaths(job)
     (path,) = whole.paths
     second = sand.model_copy(update={"name": "sand 2", "edge_margin_m": 0.05})
     write(sand, second)
-    write_job(tmp_path, replace(whole, paths=(replace(path, process="sand 2"), path)))
+    write_toolpaths(tmp_path, replace(whole, paths=(replace(path, process="sand 2"), path)))
     assert [p.edge_margin_m for p in read_work(tmp_path).processes] == [0.05, 0.0]
     # A job of before: nothing tells which of the two it was.
     write(sand, second.model_copy(update={"name": None}))
-    write_job(tmp_path, whole)
+    write_toolpaths(tmp_path, whole)
     with pytest.raises(ProcessError, match=r"'sand' on 'top' may be of 2 processes of that name"):
         read_work(tmp_path)
 

@@ -23,7 +23,7 @@ from nrdf.studio.saving import save_job, save_picture, save_programs, zipped
 from nrdf.studio.session import Session
 from nrdf.studio.teaching import lesson_of
 from nrdf.studio.worker import Cancelled
-from nrdf.toolpath.types import read_job
+from nrdf.toolpath.types import read_toolpaths
 
 
 def silent(done, total):
@@ -176,7 +176,7 @@ def test_what_is_saved_can_be_read_by_the_command_line(bench):
     result = bench.results["new"]
     place = save_job(desk, "new", result, {"command": "nrdf studio"})
     assert save_job(desk, "new", result, {}) == place, "it can be saved again"
-    assert len(read_job(place).paths) == 2 and (place / "report.html").is_file()
+    assert len(read_toolpaths(place).paths) == 2 and (place / "report.html").is_file()
     assert list(read_bound_knowledge(place / "knowledge.yaml").regions) == ["top", "front"]
     programs = save_programs(desk, "new", result, ("csv", "urscript"))
     names = zipfile.ZipFile(BytesIO(zipped(programs))).namelist()

@@ -29,7 +29,7 @@ from nrdf.studio.document import REFERENCE
 from nrdf.studio.mouse import view_of
 from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
-from nrdf.toolpath.types import read_job
+from nrdf.toolpath.types import read_toolpaths
 
 SHOTS = Path(__file__).parents[2] / "build" / "studio"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -312,7 +312,7 @@ def test_all_steps(person, studio, tmp_path):
     with page.expect_download() as report:
         person.press("Report as one page")
     assert b"<table>" in Path(report.value.path()).read_bytes()
-    job = read_job(desk.session.folder / "saved" / "ladder-back" / "job")
+    job = read_toolpaths(desk.session.folder / "saved" / "ladder-back" / "job")
     assert {path.process for path in job.paths} == {"sand", "polish"}
     person.shoot("saved")
 

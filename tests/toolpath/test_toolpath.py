@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import OutputError, ProcessError
 from nrdf.geometry.similarity import Similarity
-from nrdf.toolpath.types import FILE, Job, Segment, ToolPath, read_job, write_job
+from nrdf.toolpath.types import FILE, Job, Segment, ToolPath, read_toolpaths, write_toolpaths
 
 POSE = Similarity(
     Rotation.from_euler("xyz", [0.3, -1.2, 2.0]).as_matrix(), np.array([1.0, -0.5, 0.25]), 0.9
@@ -35,7 +35,7 @@ def random_job():
 
 def changed(tmp_path, change):
     """The file of a good job after `change` of its content."""
-    path = write_job(tmp_path, random_job())
+    path = write_toolpaths(tmp_path, random_job())
     content = json.loads(path.read_text("utf-8"))
     change(content)
     path.write_text(json.dumps(content), "utf-8")
@@ -44,9 +44,9 @@ def changed(tmp_path, change):
 
 def test_a_job_comes_back_exactly(tmp_path):
     job = random_job()
-    assert write_job(tmp_path, job) == tmp_path / FILE
+    assert write_toolpaths(tmp_path, job) == tmp_path / FILE
     for place in (tmp_path, tmp_path / FILE):
-        read = read_job(place)
+        read = read_toolpaths(place)
         assert (read.category, read.frame) == ("chair", "cell")
         np.testing.assert_allclose(read.pose.rotation, POSE.rotation, atol=1e-14)
         np.testing.assert_array_equal(read.pose.translation, POSE.translation)
@@ -64,8 +64,8 @@ def test_a_job_comes_back_exactly(tmp_path):
                     assert getattr(same, name) == getattr(segment, name)
                 np.testing.assert_array_equal(same.positions, segment.positions)
                 np.testing.assert_array_equal(same.quaternions_xyzw, segment.quaternions_xyzw)
-    write_job(tmp_path, read_job(tmp_path))
-    assert read_job(tmp_path).paths[0].tool_radius_m == 0.0625
+    write_toolpaths(tmp_path, read_toolpaths(tmp_path))
+    assert read_toolpaths(tmp_path).paths[0].tool_radius_m == 0.0625
 
 
 def test_an_early_job_has_no_pose_and_is_taken_to_be_canonical(tmp_path):
@@ -73,10 +73,10 @@ def test_an_early_job_has_no_pose_and_is_taken_to_be_canonical(tmp_path):
         content.pop("pose")
         content["version"] = 1
 
-    job = read_job(changed(tmp_path, early))
+    job = read_toolpaths(changed(tmp_path, early))
     assert job.pose is None
     assert (job.up.tolist(), job.forward.tolist()) == ([0, 1, 0], [1, 0, 0])
-    assert read_job(write_job(tmp_path, job)).pose is None
+    assert read_toolpaths(write_toolpaths(tmp_path, job)).pose is None
 
 
 def pose_with(**changes):
@@ -115,30 +115,30 @@ def segment_with(**changes):
 )
 def test_what_is_wrong_in_a_file_is_named_by_field(tmp_path, change, message):
     with pytest.raises(ProcessError, match=message):
-        read_job(changed(tmp_path, change))
+        read_toolpaths(changed(tmp_path, change))
 
 
 def test_files_that_are_no_tool_paths_are_told(tmp_path, monkeypatch):
     with pytest.raises(ProcessError, match=r"cannot read .*toolpaths.json.*nrdf transfer"):
-        read_job(tmp_path)
+        read_toolpaths(tmp_path)
     for text in ("", "[" * 100_000, "{}", "[]", "no JSON", b"\xff\xfe"):
         (tmp_path / FILE).write_bytes(text if isinstance(text, bytes) else text.encode())
         with pytest.raises(ProcessError, match=r"toolpaths\.json: "):
-            read_job(tmp_path)
+            read_toolpaths(tmp_path)
     monkeypatch.setattr("nrdf.toolpath.types._LARGEST_FILE", 1 << 20)
     (tmp_path / FILE).write_bytes(b" " * (1 << 20) + b" ")
     with pytest.raises(ProcessError, match="larger than 1 MiB"):
-        read_job(tmp_path)
+        read_toolpaths(tmp_path)
 
 
 def test_what_could_not_be_read_is_not_written(tmp_path):
     segment = Segment("process", 0, np.zeros((1, 3)), np.zeros((1, 4)), 0.1)
     path = ToolPath("seat", "sand", "disc", 0.1, (segment,))
     with pytest.raises(ProcessError, match=r"the job: .*a quaternion of length 0, not 1"):
-        write_job(tmp_path, Job("chair", "cell", (path,)))
+        write_toolpaths(tmp_path, Job("chair", "cell", (path,)))
     path = ToolPath("seat", "sand", "disc", 0.1, (), parameters={"when": object()})
     with pytest.raises(ProcessError, match="no JSON file can hold"):
-        write_job(tmp_path, Job("chair", "cell", (path,)))
+        write_toolpaths(tmp_path, Job("chair", "cell", (path,)))
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(OutputError, match="cannot write"):
-        write_job(tmp_path / "missing", random_job())
+        write_toolpaths(tmp_path / "missing", random_job())

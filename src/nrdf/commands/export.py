@@ -34,10 +34,10 @@ def export(
     """
     from nrdf.export.registry import check_formats, export_job
     from nrdf.io.output import output_folder
-    from nrdf.toolpath.types import read_job
+    from nrdf.toolpath.types import read_toolpaths
 
     check_formats(format)
-    content = read_job(job)
+    content = read_toolpaths(job)
     place = out or (job if job.is_dir() else job.parent) / "export"
     with output_folder(place, overwrite, [job]) as folder:
         files = export_job(content, format, folder, programs)

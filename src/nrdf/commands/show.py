@@ -116,7 +116,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     from nrdf.export.registry import export_job
     from nrdf.process.limits import Limits
     from nrdf.process.transfer import ProcessTransfer
-    from nrdf.reports.job_folder import job_of, panel_of, write_transfer
+    from nrdf.reports.job_folder import job_of, panel_of, write_job_files
     from nrdf.viz.picture import draw_regions
 
     loaded = nrdf.load_model(model, device)
@@ -144,7 +144,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
             results += found
             panels.append(panel_of(transferred, chair, _note(found, transferred)))
             (folder / chair).mkdir()
-            write_transfer(folder / chair, transferred, Limits(), chair, origin)
+            write_job_files(folder / chair, transferred, Limits(), chair, origin)
             export_job(job_of(transferred), EXPORTED, folder / chair / "export")
         progress(len(every) + 1, len(every) + 1)
     draw_regions(panels, folder / "picture.png")

@@ -110,7 +110,7 @@ def transfer(
         import nrdf
         from nrdf.process.bound_knowledge import files_of, read_bound_knowledge, unit_and_doubts
         from nrdf.process.transfer import MIN_CONFIDENCE, ProcessTransfer
-        from nrdf.reports.job_folder import write_transfer
+        from nrdf.reports.job_folder import write_job_files
 
         lesson = read_bound_knowledge(knowledge)
         check_inputs(out, files_of(lesson.knowledge, knowledge.parent))
@@ -145,7 +145,7 @@ def transfer(
             "versions": versions(),
         }
         with errors.status("report"):
-            report = write_transfer(folder, transferred, limits, target.name, origin)
+            report = write_job_files(folder, transferred, limits, target.name, origin)
     show_transfer(report)
     console.print(f"{_summary(report)}; all in {out}")
     if not report["total"]["paths"]:

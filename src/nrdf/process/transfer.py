@@ -4,8 +4,8 @@ A `ProcessTransfer` is knowledge on its reference, embedded once; `transfer` tak
 targets.
 
     teacher = nrdf.teach("chair.yaml")
-    job = teacher.transfer(nrdf.read_cloud("new.ply"))
-    job.write("job/")
+    result = teacher.transfer(nrdf.read_cloud("new.ply"))
+    nrdf.write_job("job/", result)
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ from nrdf.geometry.units import in_words
 from nrdf.io.bounds import SHARE
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
-from nrdf.io.output import output_folder
 from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_doubts
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.knowledge import Line, Process, Transfer
@@ -101,17 +99,6 @@ class TransferResult:
     pose: Similarity | None = None
     doubts: tuple[str, ...] = ()
     kind: KindCheck | None = None
-
-    def write(self, path: str | Path, title: str = "target", overwrite: bool = False) -> None:
-        """Write the folder that `nrdf transfer` writes; it appears whole or not at all.
-
-        Raises OutputError if it is not empty, without `overwrite`, or cannot be written.
-        """
-        from nrdf.process.limits import Limits
-        from nrdf.reports.job_folder import write_transfer
-
-        with output_folder(path, overwrite) as folder:
-            write_transfer(folder, self, Limits(), title, {})
 
 
 class ProcessTransfer:

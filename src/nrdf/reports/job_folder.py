@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.io.cloud import write_cloud
-from nrdf.io.output import REPORT, write_json
+from nrdf.io.output import REPORT, output_folder, write_json
 from nrdf.process.bound_knowledge import checksum, overlaps
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
@@ -21,7 +21,7 @@ from nrdf.process.transfer import TransferResult, touched
 from nrdf.regions.files import write_matches
 from nrdf.reports.page import write_page
 from nrdf.reports.transfer_report import report_of
-from nrdf.toolpath.types import Job, write_job
+from nrdf.toolpath.types import Job, write_toolpaths
 from nrdf.viz.picture import Panel, draw_regions, render_details
 
 KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
@@ -29,7 +29,19 @@ PAGE, PICTURE = "report.html", "picture.png"
 _WHOLE, _DETAIL = 540, 280  # pixels of a view; the page shows details smaller
 
 
-def write_transfer(
+def write_job(
+    path: str | Path, result: TransferResult, title: str = "target", overwrite: bool = False
+) -> None:
+    """Write a transfer's result as the folder that `nrdf transfer` writes.
+
+    title: name of the target in the report. The folder appears whole or not at all. Raises
+    OutputError if it is not empty, without `overwrite`, or cannot be written.
+    """
+    with output_folder(path, overwrite) as folder:
+        write_job_files(folder, result, Limits(), title, {})
+
+
+def write_job_files(
     folder: Path,
     transferred: TransferResult,
     limits: Limits,
@@ -50,7 +62,7 @@ def write_transfer(
     write_matches(folder / REGIONS, target, found)
     job = job_of(transferred)
     if job.paths:
-        write_job(folder, job)
+        write_toolpaths(folder, job)
         write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
     start = time.perf_counter()
     panel = panel_of(transferred, title)

@@ -19,7 +19,7 @@ from nrdf.io.output import output_file, output_folder
 from nrdf.io.swap import MANIFEST
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
-from nrdf.reports.job_folder import job_of, panel_of, write_transfer
+from nrdf.reports.job_folder import job_of, panel_of, write_job_files
 from nrdf.studio.document import REFERENCE
 from nrdf.studio.editor import Desk
 from nrdf.studio.result_cache import Bench, Result
@@ -48,7 +48,7 @@ def save_job(desk: Desk, name: str, result: Result, origin: Mapping[str, Any]) -
     """A target's job, as `nrdf transfer` writes it; its folder."""
     place = place_of(desk, name, "job")
     with output_folder(place, overwrite=True) as folder:
-        write_transfer(folder, result.transferred, Limits(), name, origin)
+        write_job_files(folder, result.transferred, Limits(), name, origin)
     return place
 
 

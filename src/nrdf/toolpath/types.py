@@ -105,8 +105,8 @@ class Job:
         return np.eye(3)[0] if self.pose is None else self.pose.rotation[:, 0]
 
 
-def read_job(folder: str | Path) -> Job:
-    """The job that `write_job` left in a folder (or the path of its file itself).
+def read_toolpaths(folder: str | Path) -> Job:
+    """The job that `write_toolpaths` left in a folder (or the path of its file itself).
 
     Raises ProcessError where there is none, where it is larger than 256 MiB, where a newer version
     wrote it, and for a field that is missing, unknown or impossible, naming it.
@@ -127,12 +127,12 @@ def read_job(folder: str | Path) -> Job:
     return _parse(text, str(path))
 
 
-def write_job(folder: str | Path, job: Job) -> Path:
-    """Write `job` into an existing folder; the file's path. `read_job` gives exactly the same back,
-    but for the last digits of the pose's rotation.
+def write_toolpaths(folder: str | Path, job: Job) -> Path:
+    """Write `job` into an existing folder as toolpaths.json; the file's path.
 
-    Raises ProcessError, naming the field, for what `read_job` would refuse, and OutputError where
-    the folder cannot be written.
+    `read_toolpaths` gives exactly the same back, but for the last digits of the pose's rotation.
+    Raises ProcessError, naming the field, for what `read_toolpaths` would refuse, and OutputError
+    where the folder cannot be written.
     """
     path = Path(folder) / FILE
     content = {"version": VERSION, **_plain(job)}

@@ -29,7 +29,7 @@ from nrdf.robot.simulation.collision import Collision
 from nrdf.robot.simulation.collision_free import drive
 from nrdf.robot.simulation.execute import Log
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.types import Job, ToolPath, read_job
+from nrdf.toolpath.types import Job, ToolPath, read_toolpaths
 
 log = logging.getLogger(__name__)
 
@@ -102,7 +102,7 @@ def read_work(folder: str | Path, up: str | None = None) -> Work:
     fit each other: another frame or unit.
     """
     folder = Path(folder)
-    job = read_job(folder)
+    job = read_toolpaths(folder)
     if not folder.is_dir():
         folder = folder.parent
     if not (folder / KNOWLEDGE).is_file():

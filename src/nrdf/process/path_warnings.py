@@ -1,0 +1,61 @@
+"""Warnings about a planned tool path, from its measures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nrdf.geometry.units import in_words
+from nrdf.process.knowledge import Process
+from nrdf.toolpath.metrics import NO_ROOM, Measures
+
+_MOST_UNREACHED = 0.03
+_LARGEST_STEP = 2.0  # times the spacing of waypoints
+_LARGEST_TURN_RAD = np.radians(30.0)
+_WIDEST_LINES = 1.15  # times the stepover
+_FARTHEST_M = 0.001
+_STEEPEST_RAD = np.radians(5.0)
+
+
+def measure_warnings(process: Process, measures: Measures) -> list[str]:
+    """What a person should look at before a path is driven."""
+    lines = []
+    if measures.left_out[NO_ROOM] > 0.0:
+        room = in_words("clearance_m", process.tool.clearance_m)
+        lines.append(
+            f"{measures.left_out[NO_ROOM]:.1%} of the region has less than {room} free before it, "
+            "and is left out"
+        )
+    if measures.unreached > _MOST_UNREACHED:
+        lines.append(
+            f"the tool does not reach {measures.unreached:.1%} of the region, beside what is left "
+            "out"
+        )
+    worst, stepover = measures.line_spacing_worst_m, process.distance_between_lines_m
+    if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
+        lines.append(
+            f"lines are up to {in_words('spacing_m', worst)} apart; "
+            f"{in_words('stepover_m', stepover)} were asked for"
+        )
+    if process.trajectory != "taught" and measures.step_worst_m > _LARGEST_STEP * process.spacing_m:
+        step, asked = (in_words("_m", x) for x in (measures.step_worst_m, process.spacing_m))
+        lines.append(f"a step of {step} between neighbouring waypoints; {asked} were asked for")
+    if measures.turn_worst_rad > _LARGEST_TURN_RAD:
+        turn = in_words("_rad", measures.turn_worst_rad)
+        lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
+    lines += _distance_warnings(process, measures)
+    if measures.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
+        error = in_words("error_rad", measures.axis_error_99_rad)
+        lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
+    return lines
+
+
+def _distance_warnings(process: Process, measures: Measures) -> list[str]:
+    """By the object as it was given, where that is known: the plan cannot judge itself."""
+    planned, true = measures.surface_distance_99_m, measures.true_distance_99_m
+    if true is not None and true > max(_FARTHEST_M, measures.resolution_m or 0.0):
+        away = in_words("_m", true)
+        return [f"1 % of the way on the surface is more than {away} off {measures.judged_by}"]
+    if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
+        away = in_words("_m", planned)
+        return [f"1 % of the waypoints are more than {away} off the surface planned on"]
+    return []
