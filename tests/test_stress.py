@@ -22,7 +22,7 @@ from nrdf.errors import OutputError
 from nrdf.export.registry import export_job
 from nrdf.io.locks import claim
 from nrdf.io.swap import MANIFEST
-from nrdf.toolpath.types import write_toolpaths
+from nrdf.toolpath.file import write_toolpaths
 
 LIMITED = """
 import resource, sys
@@ -53,7 +53,7 @@ import resource, sys
 from pathlib import Path
 from nrdf.errors import OutputError
 from nrdf.export.registry import FORMATS, export_job
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 import rosbags.rosbag2
 job = read_toolpaths(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))

@@ -27,7 +27,7 @@ from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
 from nrdf.process.transfer import ProcessTransfer, TransferResult
 from nrdf.reports.job_folder import write_job
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 from nrdf_benchmark.objects_match import Finder, Settings, finder
 
 SIZE_M = 0.9

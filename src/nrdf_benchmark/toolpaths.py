@@ -23,7 +23,8 @@ from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import Measures, measure
-from nrdf.toolpath.planner import Strategy, plan
+from nrdf.toolpath.planner import plan
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 from nrdf_benchmark.bsrc import read_bsrc
 from nrdf_benchmark.family import CLOUD_POINTS, FIRST_SEED

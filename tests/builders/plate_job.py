@@ -19,7 +19,8 @@ def write_job_on(folder, points, normals, region, segments):
     import nrdf
     from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
     from nrdf.process.knowledge_file import write_knowledge
-    from nrdf.toolpath.types import Job, write_toolpaths
+    from nrdf.toolpath.file import write_toolpaths
+    from nrdf.toolpath.types import Job
 
     nrdf.write_cloud(folder / "target.ply", nrdf.PointCloud(points, normals, unit="m"))
     process = Process(

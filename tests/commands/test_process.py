@@ -13,7 +13,7 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import read_knowledge
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 
 
 @pytest.fixture

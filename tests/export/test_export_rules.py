@@ -19,7 +19,8 @@ from nrdf.export.options import Options
 from nrdf.export.prepare import strokes
 from nrdf.export.registry import FORMATS, export_job
 from nrdf.io.swap import MANIFEST
-from nrdf.toolpath.types import Job, Segment, ToolPath, write_toolpaths
+from nrdf.toolpath.file import write_toolpaths
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 DOWN = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -319,7 +320,7 @@ def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):
     for words in (["--format", "csv", "krk"], ["--format", "csv", "krl", "--program", "if"]):
         with pytest.raises(ProcessError):
             run(str(tmp_path), *words, "--out", str(tmp_path / "out"))
-    path.write_text(path.read_text().replace('"version":2', '"version":99'))
-    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 2"):
+    path.write_text(path.read_text().replace('"version":3', '"version":99'))
+    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 3"):
         run(str(tmp_path), "--format", "csv", "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]

@@ -21,7 +21,8 @@ from nrdf.export.registry import export_job
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.knowledge_file import write_knowledge
-from nrdf.toolpath.types import Job, Segment, ToolPath, read_toolpaths, write_toolpaths
+from nrdf.toolpath.file import read_toolpaths, write_toolpaths
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 WRITTEN = ("csv", "json", "urscript", "krl")
 

@@ -11,7 +11,7 @@ from builders.fuzzing import message_of
 from builders.solids import box
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 

@@ -20,7 +20,7 @@ from nrdf.process.knowledge_file import (
     validated,
     write_knowledge,
 )
-from nrdf.toolpath import planner as plan
+from nrdf.toolpath.strategy import TRAJECTORIES
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 TAUGHT = {**SAND, "trajectory": "taught", "waypoints": [{"positions_m": [[0, 0, 0], [1, 0, 0]]}]}
@@ -356,7 +356,7 @@ def test_the_file_in_the_documentation_is_right():
 
 
 def test_names_are_those_of_the_planner_and_of_clouds():
-    assert set(get_args(Trajectory)) == {*plan.TRAJECTORIES, "taught"}
+    assert set(get_args(Trajectory)) == {*TRAJECTORIES, "taught"}
     with pytest.raises(ValidationError):
         Reference.model_validate({"cloud": "a", "unit": "km"})
     for unit in METRES:

@@ -18,7 +18,7 @@ from nrdf.process.check import check
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.reports.job_folder import job_of, panel_of, write_job_files
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 
 PAINT = {
     "kind": "paint", "stepover_mm": 60, "standoff_mm": 100, "tool": {"radius_mm": 40},

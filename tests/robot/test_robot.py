@@ -203,7 +203,8 @@ def test_a_urdf_keeps_its_speed_limits_and_says_which_meshes_are_missing(tmp_pat
 
 def test_a_folder_that_is_no_whole_job(tmp_path):
     from nrdf.robot.simulation.simulate import read_work
-    from nrdf.toolpath.types import Job, write_toolpaths
+    from nrdf.toolpath.file import write_toolpaths
+    from nrdf.toolpath.types import Job
 
     write_toolpaths(tmp_path, Job("chair", "target", (path_of(),)))
     with pytest.raises(ProcessError, match=r"has no knowledge\.yaml"):
@@ -230,7 +231,7 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
 def turned_job(job, folder, pose):
     """The plate's job, its object and tool paths, in another frame."""
     import nrdf
-    from nrdf.toolpath.types import read_toolpaths, write_toolpaths
+    from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 
     def turned(segment):
         held = Rotation.from_matrix(pose.rotation) * Rotation.from_quat(segment.quaternions_xyzw)
@@ -294,7 +295,7 @@ def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_t
 def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
     from nrdf.process.knowledge_file import read_knowledge, write_knowledge
     from nrdf.robot.simulation.simulate import read_work
-    from nrdf.toolpath.types import read_toolpaths, write_toolpaths
+    from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 
     for name in ("target.ply", "knowledge.yaml"):
         (tmp_path / name).write_bytes((job / name).read_bytes())

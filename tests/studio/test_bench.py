@@ -23,7 +23,7 @@ from nrdf.studio.saving import save_job, save_picture, save_programs, zipped
 from nrdf.studio.session import Session
 from nrdf.studio.teaching import lesson_of
 from nrdf.studio.worker import Cancelled
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 
 
 def silent(done, total):

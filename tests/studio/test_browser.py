@@ -29,7 +29,7 @@ from nrdf.studio.document import REFERENCE
 from nrdf.studio.mouse import view_of
 from nrdf.studio.serving import open_server
 from nrdf.studio.session import Session
-from nrdf.toolpath.types import read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
 
 SHOTS = Path(__file__).parents[2] / "build" / "studio"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

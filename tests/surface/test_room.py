@@ -10,7 +10,8 @@ from nrdf.errors import ProcessError
 from nrdf.surface.accessibility import with_room
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure
-from nrdf.toolpath.planner import Strategy, plan
+from nrdf.toolpath.planner import plan
+from nrdf.toolpath.strategy import Strategy
 
 
 def stacked(gap):

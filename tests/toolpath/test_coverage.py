@@ -13,7 +13,8 @@ from nrdf.errors import ProcessError
 from nrdf.surface.given_surface import MeshSurface
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure
-from nrdf.toolpath.planner import Strategy, drive
+from nrdf.toolpath.planner import drive
+from nrdf.toolpath.strategy import Strategy
 
 STRATEGY = Strategy(stepover_m=0.04, spacing_m=0.01, tool_radius_m=0.025, feed_m_s=0.1)
 SURFACE = Surface(*board(spacing=0.008))

@@ -14,7 +14,8 @@ from nrdf.surface import surface as surface_module
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.effort import MOST_LINES, MOST_WAYPOINTS, check_passes, effort_of
-from nrdf.toolpath.planner import Strategy, plan
+from nrdf.toolpath.planner import plan
+from nrdf.toolpath.strategy import Strategy
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from nrdf.errors import ProcessError
 from nrdf.shapes.families import get_family
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure
-from nrdf.toolpath.planner import TRAJECTORIES, Strategy, drive, plan
+from nrdf.toolpath.planner import drive, plan
+from nrdf.toolpath.strategy import TRAJECTORIES, Strategy
 from nrdf.toolpath.types import Segment
 
 STRATEGY = Strategy(stepover_m=0.025, spacing_m=0.01, tool_radius_m=0.025)

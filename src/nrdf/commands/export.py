@@ -34,7 +34,7 @@ def export(
     """
     from nrdf.export.registry import check_formats, export_job
     from nrdf.io.output import output_folder
-    from nrdf.toolpath.types import read_toolpaths
+    from nrdf.toolpath.file import read_toolpaths
 
     check_formats(format)
     content = read_toolpaths(job)

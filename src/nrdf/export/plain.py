@@ -11,7 +11,8 @@ from nrdf.export.header import header, save, tool_z_words
 from nrdf.export.names import program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.toolpath.types import Job, pose_of
+from nrdf.toolpath.file import pose_to_dict
+from nrdf.toolpath.types import Job
 
 VERSION = 1
 _CARRIED = (
@@ -76,7 +77,7 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
         "conventions": conventions,
         "category": job.category,
         "frame": job.frame,
-        "pose": pose_of(job.pose),
+        "pose": pose_to_dict(job.pose),
         "waypoint": list(WAYPOINT),
         "paths": paths,
     }

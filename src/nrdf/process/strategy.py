@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.process.knowledge import Process
-from nrdf.toolpath.planner import Strategy
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment, ToolPath
 
 
@@ -43,7 +43,7 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
 
 
 def tool_path(region: str, process: Process, segments: Sequence[Segment]) -> ToolPath:
-    """Segments on a region as the tool path of a process."""
+    """Segments on a region as the tool path of a process, with its strategy."""
     return ToolPath(
         region=region,
         process=process.label,
@@ -55,4 +55,5 @@ def tool_path(region: str, process: Process, segments: Sequence[Segment]) -> Too
         tcp_m=process.tool.tcp_m,
         tcp_quaternion_xyzw=process.tool.tcp_quaternion_xyzw,
         force_tolerance_n=process.force_tolerance_n,
+        strategy=strategy_of(process),
     )

@@ -21,7 +21,8 @@ from nrdf.process.transfer import TransferResult, touched
 from nrdf.regions.files import write_matches
 from nrdf.reports.page import write_page
 from nrdf.reports.transfer_report import report_of
-from nrdf.toolpath.types import Job, write_toolpaths
+from nrdf.toolpath.file import write_toolpaths
+from nrdf.toolpath.types import Job
 from nrdf.viz.picture import Panel, draw_regions, render_details
 
 KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"

@@ -11,8 +11,8 @@ from nrdf.process.knowledge import Process
 from nrdf.process.limits import Limits, doubts_of
 from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.transfer import PathResult, TransferResult
+from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.metrics import REASONS
-from nrdf.toolpath.types import pose_of
 
 FIGURES = (
     "worked · left out · unreached", "overlap", "line spacing, mean · worst",
@@ -45,7 +45,7 @@ def report_of(transferred: TransferResult, limits: Limits) -> dict[str, Any]:
         "category": transferred.lesson.knowledge.category,
         "unit": "m",
         "frame": transferred.target.frame,
-        "pose": pose_of(transferred.pose),
+        "pose": pose_to_dict(transferred.pose),
         "regions": _regions(transferred),
         "paths": paths,
         "total": {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.units import in_words
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch
-
-if TYPE_CHECKING:
-    from nrdf.toolpath.planner import Strategy
+from nrdf.toolpath.strategy import Strategy
 
 MOST_WAYPOINTS, MOST_LINES = 200_000, 10_000
 """Of a process, all its passes together."""

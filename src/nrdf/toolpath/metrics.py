@@ -14,8 +14,8 @@ from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import lean_rotation, surface_frames, travel_of
-from nrdf.toolpath.planner import Strategy
 from nrdf.toolpath.sampled_path import Track, line_spacing
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 
 _SHORTEST_M = 1e-3

@@ -29,7 +29,8 @@ from nrdf.robot.simulation.collision import Collision
 from nrdf.robot.simulation.collision_free import drive
 from nrdf.robot.simulation.execute import Log
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.types import Job, ToolPath, read_toolpaths
+from nrdf.toolpath.file import read_toolpaths
+from nrdf.toolpath.types import Job, ToolPath
 
 log = logging.getLogger(__name__)
 

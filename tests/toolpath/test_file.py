@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -8,11 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import OutputError, ProcessError
 from nrdf.geometry.similarity import Similarity
-from nrdf.toolpath.types import FILE, Job, Segment, ToolPath, read_toolpaths, write_toolpaths
+from nrdf.toolpath.file import FILE, read_toolpaths, write_toolpaths
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 POSE = Similarity(
     Rotation.from_euler("xyz", [0.3, -1.2, 2.0]).as_matrix(), np.array([1.0, -0.5, 0.25]), 0.9
 )
+STRATEGY = Strategy("spiral", np.array([0.0, 0.6, 0.8]), 0.03, tilt_rad=0.1, force_n=12.5)
 
 
 def random_segment(rng, kind="process", count=7):
@@ -24,9 +28,20 @@ def random_segment(rng, kind="process", count=7):
 
 def random_job():
     rng = np.random.default_rng(0)
-    segments = tuple(random_segment(rng, kind) for kind in ("approach", "process", "retract"))
+    segments = tuple(
+        random_segment(rng, kind) for kind in ("approach", "process", "retract", "transition")
+    )
     paths = (
-        ToolPath("Sitzfläche", "sand", "disc 125", np.float64(0.0625), segments, 300.0, {"a": [1]}),
+        ToolPath(
+            "Sitzfläche",
+            "sand",
+            "disc 125",
+            np.float64(0.0625),
+            segments,
+            300.0,
+            {"a": [1]},
+            strategy=STRATEGY,
+        ),
         ToolPath("back", "inspect", "camera", 0.01, segments[:1]),
         ToolPath("legs", "oil", "pad", 0.01, (), None, {}, (0.1, 0.0, 0.2), (0.6, 0.8, 0, 0), 2.5),
     )
@@ -59,11 +74,15 @@ def test_a_job_comes_back_exactly(tmp_path):
                 "tcp_m", "tcp_quaternion_xyzw", "force_tolerance_n",
             ):  # fmt: skip
                 assert getattr(again, name) == getattr(path, name)
+            assert (again.strategy is None) == (path.strategy is None)
             for segment, same in zip(path.segments, again.segments, strict=True):
                 for name in ("kind", "line", "feed_m_s", "force_n", "dwell_s"):
                     assert getattr(same, name) == getattr(segment, name)
                 np.testing.assert_array_equal(same.positions, segment.positions)
                 np.testing.assert_array_equal(same.quaternions_xyzw, segment.quaternions_xyzw)
+    strategy = read.paths[0].strategy
+    for name in (item.name for item in fields(Strategy)):
+        np.testing.assert_array_equal(getattr(strategy, name), getattr(STRATEGY, name))
     write_toolpaths(tmp_path, read_toolpaths(tmp_path))
     assert read_toolpaths(tmp_path).paths[0].tool_radius_m == 0.0625
 
@@ -79,6 +98,23 @@ def test_an_early_job_has_no_pose_and_is_taken_to_be_canonical(tmp_path):
     assert read_toolpaths(write_toolpaths(tmp_path, job)).pose is None
 
 
+@pytest.mark.parametrize("version", [1, 2])
+def test_early_files_have_no_strategy_and_call_a_retract_departure(tmp_path, version):
+    def early(content):
+        content["version"] = version
+        for path in content["paths"]:
+            path.pop("strategy")
+        content["paths"][0]["segments"][2]["kind"] = "departure"
+
+    path = read_toolpaths(changed(tmp_path, early)).paths[0]
+    assert path.strategy is None
+    assert path.segments[2].kind == "retract"
+
+
+def strategy_with(**changes):
+    return lambda content: content["paths"][0]["strategy"].update(changes)
+
+
 def pose_with(**changes):
     return lambda content: content["pose"].update(changes)
 
@@ -90,7 +126,7 @@ def segment_with(**changes):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda c: c.update(version=3), "version 3; this nrdf reads versions up to 2: update nrdf"),
+        (lambda c: c.update(version=4), "version 4; this nrdf reads versions up to 3: update nrdf"),
         (lambda c: c.pop("version"), "version: is missing"),
         (lambda c: c.update(speed=1), "unknown key 'speed'"),
         (lambda c: c.update(frame="a\nb"), r"frame: a name with line breaks.*'a\\nb'"),
@@ -101,7 +137,10 @@ def segment_with(**changes):
         (lambda c: c["paths"][1].pop("region"), r"paths\[1\].region: is missing"),
         (segment_with(feed_m_s=-1), r"segments\[1\].feed_m_s: must be above 0.0, not -1"),
         (segment_with(feed_m_s=float("nan")), "feed_m_s: .*finite"),
-        (segment_with(kind="fly"), "must be 'approach', 'process' or 'retract', not 'fly'"),
+        (
+            segment_with(kind="fly"),
+            "must be 'approach', 'process', 'transition' or 'retract', not 'fly'",
+        ),
         (segment_with(positions_m=[]), "positions_m: .*at least 1"),
         (segment_with(positions_m=[[0, 0]]), r"positions_m\[0\]\[2\]: is missing"),
         (segment_with(quaternions_xyzw=[[0, 0, 0, 2]]), "a quaternion of length 2, not 1"),
@@ -109,6 +148,10 @@ def segment_with(**changes):
         (pose_with(scale_m=0), "pose.scale_m: must be above 0"),
         (pose_with(translation_m=[0, float("nan"), 0]), "pose.translation_m.*finite"),
         (pose_with(up=[0, 0, 1]), "pose contradicts itself: up is 0 0 1, but its quaternion takes"),
+        (strategy_with(passes=0), r"paths\[0\].strategy: passes is 0; give a value above 0"),
+        (strategy_with(trajectory="zigzag"), "strategy.trajectory: must be 'raster'.*'zigzag'"),
+        (strategy_with(speed=1), r"unknown key 'paths\[0\].strategy.speed'"),
+        (lambda c: c["paths"][0]["strategy"].pop("passes"), "strategy.passes: is missing"),
         (lambda c: c["pose"].pop("up"), "pose.up: is missing"),
         (segment_with(positions_m=[[0, 0, 0]]), "has 1 positions_m, but 7 quaternions_xyzw"),
     ],
@@ -125,7 +168,7 @@ def test_files_that_are_no_tool_paths_are_told(tmp_path, monkeypatch):
         (tmp_path / FILE).write_bytes(text if isinstance(text, bytes) else text.encode())
         with pytest.raises(ProcessError, match=r"toolpaths\.json: "):
             read_toolpaths(tmp_path)
-    monkeypatch.setattr("nrdf.toolpath.types._LARGEST_FILE", 1 << 20)
+    monkeypatch.setattr("nrdf.toolpath.file._LARGEST_FILE", 1 << 20)
     (tmp_path / FILE).write_bytes(b" " * (1 << 20) + b" ")
     with pytest.raises(ProcessError, match="larger than 1 MiB"):
         read_toolpaths(tmp_path)

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+
+from nrdf.geometry.similarity import Similarity
+from nrdf.toolpath.types import Job, Segment, ToolPath
+
+
+def segment(kind, line=0, count=3):
+    positions = np.arange(3.0 * count).reshape(count, 3)
+    return Segment(kind, line, positions, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), 0.1)
+
+
+def test_waypoints_are_the_poses_of_a_segment_in_order():
+    quaternions = np.eye(4)[:3]
+    made = Segment("process", 0, np.arange(9.0).reshape(3, 3), quaternions, 0.1).waypoints
+    assert [w.position_m.tolist() for w in made] == [[0, 1, 2], [3, 4, 5], [6, 7, 8]]
+    assert [w.quaternion_xyzw.tolist() for w in made] == quaternions.tolist()
+
+
+def test_groups_are_process_segments_with_the_moves_beside_them():
+    kinds = ("approach", "process", "retract", "transition", "approach", "process", "process")
+    segments = tuple(segment(kind, line) for line, kind in enumerate(kinds))
+    path = ToolPath("seat", "sand", "disc", 0.02, segments)
+    found = [
+        [None if s is None else s.line for s in (group.approach, group.process, group.retract)]
+        for group in path.groups
+    ]
+    assert found == [[0, 1, 2], [4, 5, None], [None, 6, None]]
+    assert ToolPath("seat", "sand", "disc", 0.02, ()).groups == ()
+
+
+def test_up_and_forward_are_the_pose_s_axes():
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    job = Job("chair", "cell", (), Similarity(turn, np.zeros(3), 1.0))
+    assert job.up.tolist() == turn[:, 1].tolist()
+    assert job.forward.tolist() == turn[:, 0].tolist()
