@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,26 @@ def test_every_verb_of_a_group_explains_itself_with_an_example(group, verb, caps
         cli.run([group, verb, "--help"])
     assert ended.value.code == 0
     assert f"Example: nrdf {group} {verb}" in capsys.readouterr().out
+
+
+def test_what_only_the_benchmark_has_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "entry_points", lambda group: ())
+    assert "eval" not in cli.verbs()
+    for words in (["eval", "bsrc"], ["ablate", "chair"]):
+        assert cli.run(words) == 2
+        assert "pip install 'nrdf[benchmark]'" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_package_that_is_gone_adds_no_verbs_and_a_broken_one_is_told(monkeypatch):
+    def found(value):
+        monkeypatch.setattr(
+            cli, "entry_points", lambda group: [EntryPoint("eval", value, "nrdf.commands")]
+        )
+        return cli.verbs()
+
+    assert "eval" not in found("no_such_package.commands:evaluations")
+    with pytest.raises(ModuleNotFoundError, match=r"nrdf\.no_such_module"):
+        found("nrdf.no_such_module:evaluations")
 
 
 def test_version(capsys):

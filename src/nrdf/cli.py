@@ -9,11 +9,12 @@ import os
 import re
 import sys
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import entry_points
 from typing import Any
 
 import nrdf
-from nrdf.errors import NrdfError
+from nrdf.errors import ConfigError, NrdfError
 
 USAGE = """usage: nrdf VERB ... [-v]
 
@@ -41,6 +42,8 @@ RESUMABLE = (
 )
 GROUPS = ("eval", "knowledge")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
+BENCHMARK = ("eval", "ablate")
+"""Verbs that come with `nrdf_benchmark`."""
 
 
 def verbs() -> dict[str, Callable[..., Any]]:
@@ -59,8 +62,6 @@ def verbs() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.train import train
     from nrdf.commands.transfer import transfer
     from nrdf.commands.yaw import yaw
-    from nrdf_benchmark.commands.ablate import ablate
-    from nrdf_benchmark.commands.evaluate import bench, evaluations
 
     return {
         "retrieve": retrieve,
@@ -81,10 +82,30 @@ def verbs() -> dict[str, Callable[..., Any]]:
         "yaw": yaw,
         "kind": kind,
         "zoo": zoo,
-        "eval": evaluations,
-        "ablate": ablate,
-        "bench": bench,
+        **_verbs_of_other_packages(),
     }
+
+
+def _verbs_of_other_packages() -> dict[str, Callable[..., Any]]:
+    """Verbs that installed packages add, as entry points of the group `nrdf.commands`."""
+    found: dict[str, Callable[..., Any]] = {}
+    for point in entry_points(group="nrdf.commands"):
+        try:
+            found[point.name] = point.load()
+        except ModuleNotFoundError as error:
+            # A package that is not there adds nothing; what fails inside one is a fault to see.
+            if error.name != point.module.partition(".")[0]:
+                raise
+    return found
+
+
+def _refuse_missing_benchmark(verb: str, known: Mapping[str, Any]) -> None:
+    """Raises ConfigError for a verb of the benchmark where `nrdf_benchmark` is not installed."""
+    if verb in BENCHMARK and verb not in known:
+        raise ConfigError(
+            f"`nrdf {verb}` is part of nrdf_benchmark, which is not installed; "
+            "pip install 'nrdf[benchmark]'"
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -135,6 +156,7 @@ def _parse(given: list[str]) -> int | None:
     import tyro
 
     known, prog, description = verbs(), "nrdf", None
+    _refuse_missing_benchmark(given[0], known)
     if given[0] in GROUPS:
         group = known[given[0]]
         known, prog, description = group(), f"nrdf {given[0]}", inspect.getdoc(group)
@@ -209,10 +231,11 @@ def _complain(message: str) -> None:
 def _configure_logging(verbose: bool) -> None:
     from nrdf.commands.console import LogHandler
 
-    logger = logging.getLogger("nrdf")
-    logger.handlers = [LogHandler()]
-    logger.setLevel(logging.DEBUG if verbose else logging.INFO)
-    logger.propagate = False
+    for name in ("nrdf", "nrdf_benchmark"):
+        logger = logging.getLogger(name)
+        logger.handlers = [LogHandler()]
+        logger.setLevel(logging.DEBUG if verbose else logging.INFO)
+        logger.propagate = False
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Carried waypoints against the exact truth of the parametric families, on unseen members.
+"""Warped waypoints against the exact truth of the parametric families, on unseen members.
 
-Rasters are planned on every region of a reference and carried to another member as `nrdf transfer`
+Rasters are planned on every region of a reference and warped to another member as `nrdf transfer`
 does it. Members are canonical: lengths are shares of an object's longest side.
 """
 
@@ -37,13 +37,13 @@ _RASTER = {
 
 
 @dataclass(frozen=True)
-class CarryResult:
+class WarpResult:
     """Waypoints and regions of all pairs.
 
-    errors: for each pair the distances (w,) of carried waypoints from their true places, those
-    that exist. lost: share of the waypoints with a true place that were not carried. invented:
-    share of those without one that were carried, of regions that the target has. confidence:
-    (r,) of every region on every target; present: (r,) whether the target has it.
+    errors: for each pair the distances (w,) of warped waypoints from their true positions, where
+    these exist. lost: share of the waypoints with a true position that were not warped. invented:
+    share of those without one that were warped, in regions that the target has. confidence: (r,)
+    of every region on every target; present: (r,) whether the target has it.
     """
 
     category: str
@@ -69,8 +69,8 @@ def evaluate_warp(
     category: str,
     pairs: int = 50,
     progress: Callable[[int, int], None] | None = None,
-) -> CarryResult:
-    """Carry rasters on every region between `pairs` pairs of unseen members.
+) -> WarpResult:
+    """Warp rasters on every region between `pairs` pairs of unseen members.
 
     `progress` is told (done, all). Raises DataError for a category without a family, or no pairs.
     """
@@ -104,7 +104,7 @@ def evaluate_warp(
         if progress is not None:
             progress(number + 1, pairs)
     lost, existing, invented, absent = counts
-    return CarryResult(
+    return WarpResult(
         category,
         tuple(e for e in errors if len(e)),
         lost / max(existing, 1),

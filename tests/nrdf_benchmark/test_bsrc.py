@@ -40,7 +40,7 @@ def test_any_subset_will_do_and_what_is_missing_is_named(root, caplog):
     chairs = root / "Chair"
     (chairs / "chair2").rename(chairs / "chair10")
     (chairs / "backup").mkdir()
-    with caplog.at_level(logging.INFO, "nrdf"):
+    with caplog.at_level(logging.INFO, "nrdf_benchmark"):
         benchmark = read_bsrc(root, "chair")
     assert benchmark.numbers == [1, 3, 10] and benchmark.missing == [2, 4, 5, 6, 7, 8, 9]
     said = benchmark.describe()

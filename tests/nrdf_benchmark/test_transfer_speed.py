@@ -1,11 +1,11 @@
-"""`nrdf bench`: the time of a transfer."""
+"""`nrdf eval speed`: the time of a transfer."""
 
 from __future__ import annotations
 
 import pytest
 
 from nrdf_benchmark import transfer_speed
-from nrdf_benchmark.commands.evaluate import show_transfer_speed
+from nrdf_benchmark.commands.speed import show_transfer_speed
 
 
 def test_the_parts_of_a_transfer_add_up(capsys):

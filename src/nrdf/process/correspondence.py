@@ -34,7 +34,7 @@ _SETTLING = RegistrationSettings(
     normal_weight_end=0.1,
     match_scale=0.06,
 )
-"""Chosen on unseen family pairs (`nrdf eval carry`)."""
+"""Chosen on unseen family pairs (`nrdf eval warp`)."""
 
 
 class TaughtSurface:

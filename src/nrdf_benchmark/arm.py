@@ -1,4 +1,4 @@
-"""The demonstration on the bundled arm, against the figures that it must reach."""
+"""The demonstration on the bundled arm, measured against its bars."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from nrdf.robot.simulation.simulate import read_work, simulate
 
 
 @dataclass(frozen=True)
-class Figure:
+class ArmMetric:
     """name, the bar in words, a value for each report, and whether each meets the bar."""
 
     name: str
@@ -26,7 +26,7 @@ class Figure:
     met: tuple[bool, ...]
 
 
-def drive(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, Any]]:
+def simulate_demo(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, Any]]:
     """The report of each of the demonstration's chairs.
 
     Raises DataError where `folder` is not what `nrdf demo` wrote.
@@ -36,14 +36,13 @@ def drive(folder: Path, progress: Callable[[str], None]) -> dict[str, dict[str, 
         raise DataError(f"{folder} has no {', '.join(missing)}: nrdf demo --out {folder} first")
     reports = {}
     for name in TARGETS:
-        work = read_work(folder / name)
+        job = read_work(folder / name)
         progress(name)
-        done = simulate(work, load_arm())
-        reports[name] = report_of(done)
+        reports[name] = report_of(simulate(job, load_arm()))
     return reports
 
 
-def together(reports: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def combine_reports(reports: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """All chairs as one report: shares of all waypoints and of all contact, the worst speeds."""
     paths = [path for report in reports.values() for path in report["paths"]]
     totals = [report["total"] for report in reports.values()]
@@ -66,16 +65,16 @@ def together(reports: dict[str, dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def figures(reports: dict[str, dict[str, Any]]) -> list[Figure]:
+def measure(reports: dict[str, dict[str, Any]]) -> list[ArmMetric]:
     """What the demonstration must reach, report by report."""
 
-    def figure(
+    def metric(
         name: str, bar: str, value: Callable[[dict[str, Any]], float], most: float
-    ) -> Figure:
+    ) -> ArmMetric:
         values = tuple(value(report) for report in reports.values())
         # A bar below 0 is the negative of a least value.
         good = tuple(v <= most if most >= 0.0 else v >= -most for v in values)
-        return Figure(name, bar, values, good)
+        return ArmMetric(name, bar, values, good)
 
     def worst(report: dict[str, Any], key: str) -> float:
         return max(path[key] for path in report["paths"])
@@ -86,22 +85,22 @@ def figures(reports: dict[str, dict[str, Any]]) -> list[Figure]:
         return max((100.0 * (1.0 - part["achieved"] / part[against]) for part in parts), default=0)
 
     return [
-        figure("waypoints reached, %", "at least 95",
+        metric("waypoints reached, %", "at least 95",
                lambda r: 100.0 * r["total"]["reached_share"], -95.0),
-        figure("position error, mm", "at most 0.1",
+        metric("position error, mm", "at most 0.1",
                lambda r: 1e3 * worst(r, "position_error_m"), 0.1),
-        figure("axis error, °", "at most 0.1",
+        metric("axis error, °", "at most 0.1",
                lambda r: float(np.degrees(worst(r, "axis_error_rad"))), 0.1),
-        figure("kinematics, ms a waypoint", "at most 5",
+        metric("kinematics, ms a waypoint", "at most 5",
                lambda r: r["speed"]["ik_ms_per_waypoint"], 5.0),
-        figure("moves with a collision, all reported", "0",
+        metric("moves with a collision, all reported", "0",
                lambda r: float(r["total"]["collisions"]), 0.0),
-        figure("contact within ±20 % of the force, %", "at least 95",
+        metric("contact within ±20 % of the force, %", "at least 95",
                lambda r: 100.0 * (r["total"]["force_within"] or 0.0), -95.0),
-        figure("coverage lost of the plan, worst region, %", "at most 3",
+        metric("coverage lost of the plan, worst region, %", "at most 3",
                lambda r: lost(r, "planned"), 3.0),
-        figure("coverage lost of what is driven, worst region, %", "at most 3",
+        metric("coverage lost of what is driven, worst region, %", "at most 3",
                lambda r: lost(r, "driven"), 3.0),
-        figure("times faster than real time", "at least 10",
+        metric("times faster than real time", "at least 10",
                lambda r: r["speed"]["times_real_time"], -10.0),
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The score of carried waypoints: exact where the target is the reference itself."""
+"""The score of warped waypoints: exact where the target is the reference itself."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import nrdf
 from nrdf import cli
 from nrdf.errors import DataError
 from nrdf.shapes.families import get_family
-from nrdf_benchmark import warp as carry
-from nrdf_benchmark.warp import CarryResult, evaluate_warp
+from nrdf_benchmark import warp
+from nrdf_benchmark.warp import WarpResult, evaluate_warp
 
 
 class OneTable:
@@ -27,12 +27,12 @@ class OneTable:
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(carry, "CLOUD_POINTS", 2000)
-    monkeypatch.setattr(carry, "_TRUTH_POINTS", 8000)
+    monkeypatch.setattr(warp, "CLOUD_POINTS", 2000)
+    monkeypatch.setattr(warp, "_TRUTH_POINTS", 8000)
 
 
-def test_a_reference_carried_to_itself_is_exact(small, untrained, monkeypatch):
-    monkeypatch.setattr(carry, "get_family", lambda name: OneTable())
+def test_a_reference_warped_to_itself_is_exact(small, untrained, monkeypatch):
+    monkeypatch.setattr(warp, "get_family", lambda name: OneTable())
     model = nrdf.load_model(untrained)
     model.metadata["category"] = "table"
     told = []
@@ -45,9 +45,9 @@ def test_a_reference_carried_to_itself_is_exact(small, untrained, monkeypatch):
 
 def test_shares_of_what_is_found():
     confidence, present = np.array([0.9, 0.2, 0.5, 0.1]), np.array([True, True, False, False])
-    found = CarryResult("chair", (np.array([0.1, 0.3, 0.2]),), 0.0, 0.0, confidence, present)
+    found = WarpResult("chair", (np.array([0.1, 0.3, 0.2]),), 0.0, 0.0, confidence, present)
     assert found.kept(0.3, present=True) == found.kept(0.3, present=False) == 0.5
-    assert np.isnan(CarryResult("x", (), 0, 0, confidence, ~present & present).kept(0.3, True))
+    assert np.isnan(WarpResult("x", (), 0, 0, confidence, ~present & present).kept(0.3, True))
     assert found.medians[0] == 0.2
 
 
@@ -61,9 +61,9 @@ def test_nothing_to_do_and_unknown_categories_are_refused(untrained):
 
 def test_the_verb_prints_the_figures(untrained, monkeypatch, capsys):
     errors = (np.array([0.01, 0.02, 0.03]), np.array([0.05]))
-    result = CarryResult("chair", errors, 0.02, 0.5, np.array([0.9, 0.1]), np.array([True, False]))
-    monkeypatch.setattr(carry, "evaluate_warp", lambda *asked: result)
-    assert cli.run(["eval", "carry", "--category", "chair", "--model", str(untrained)]) == 0
+    result = WarpResult("chair", errors, 0.02, 0.5, np.array([0.9, 0.1]), np.array([True, False]))
+    monkeypatch.setattr(warp, "evaluate_warp", lambda *asked: result)
+    assert cli.run(["eval", "warp", "--category", "chair", "--model", str(untrained)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "2.50%" in said and "5.00%" in said and "4 waypoints" in said
     assert "of 1 regions that targets have, 100.0% are found" in said

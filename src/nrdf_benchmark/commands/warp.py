@@ -1,4 +1,4 @@
-"""`nrdf eval carry`: taught waypoints carried to other objects, against the exact truth."""
+"""`nrdf eval warp`: waypoints warped to other objects, against the exact truth."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from nrdf.commands.console import console, progress_bar, show, table
 from nrdf.io.bounds import Count
 
 
-def carry(
+def warp(
     category: Literal["chair", "car", "plane", "table"],
     model: str | None = None,
     pairs: Count = 50,
     device: str = "cpu",
 ) -> None:
-    """Carried waypoints against the exact truth of the parametric families.
+    """Warped waypoints against the exact truth of the parametric families.
 
-    A raster on every region of a member that no training set holds is carried to another, as
-    `nrdf transfer` does it; distances are from the waypoints' true places. Also how many regions
-    that the other lacks are skipped.
+    A raster on every region of a member that no training set holds is warped to another, as
+    `nrdf transfer` does it. Distances are from the waypoints' true positions. Also how many
+    regions that the other lacks are skipped.
 
-    Example: nrdf eval carry --category chair
+    Example: nrdf eval warp --category chair
 
     Args:
         category: chair, car, plane or table.
@@ -40,12 +40,12 @@ def carry(
     errors = np.concatenate(found.errors)
     shown = table("", f"{pairs} pairs, {category}: waypoints", "median", "90 %", "worst pair")
     cells = (np.median(errors), np.quantile(errors, 0.9), found.medians.max())
-    shown.add_row("distance from the true place", *(f"{cell:.2%}" for cell in cells))
+    shown.add_row("distance from the true position", *(f"{cell:.2%}" for cell in cells))
     show(shown)
     console.print(
         f"shares of the longest side, {len(errors)} waypoints; worst pair: by its median. "
-        f"Of waypoints that have a true place {found.lost:.1%} are left out, of those that have "
-        f"none {found.invented:.0%} are carried all the same."
+        f"Of waypoints that have a true position {found.lost:.1%} are left out; of those that have "
+        f"none {found.invented:.0%} are warped all the same."
     )
     absent = int((~found.present).sum())
     console.print(

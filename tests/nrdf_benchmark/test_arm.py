@@ -1,4 +1,4 @@
-"""The demonstration's figures on the arm, against their bars."""
+"""The metrics of the demonstration on the arm, against their bars."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if find_spec("mujoco") is None:
     pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
 from nrdf.errors import DataError
-from nrdf_benchmark.robot import drive, figures, together
+from nrdf_benchmark.arm import combine_reports, measure, simulate_demo
 
 
 def report(achieved: float, reached: float = 0.97):
@@ -40,7 +40,7 @@ def report(achieved: float, reached: float = 0.97):
 
 
 def test_figures_are_the_worst_regions_and_say_whether_they_meet_the_bar():
-    found = {f.name: f for f in figures({"one": report(0.94), "other": report(0.98, 0.9)})}
+    found = {f.name: f for f in measure({"one": report(0.94), "other": report(0.98, 0.9)})}
     assert found["waypoints reached, %"].met == (True, False)
     of_plan = found["coverage lost of the plan, worst region, %"]
     # Shares of what was planned: what a region has left out makes no loss smaller.
@@ -57,7 +57,7 @@ def test_figures_are_the_worst_regions_and_say_whether_they_meet_the_bar():
 def test_all_chairs_together_are_shares_of_all_their_waypoints_and_contact():
     reports = {"one": report(0.94, 0.9), "other": report(0.98, 0.6)}
     reports["one"]["total"].update(waypoints=100, reached=90)
-    found = {f.name: f.values[0] for f in figures({"all": together(reports)})}
+    found = {f.name: f.values[0] for f in measure({"all": combine_reports(reports)})}
     assert found["waypoints reached, %"] == pytest.approx(100 * (90 + 120) / 300)
     within = (0.8 * 90 + 0.2 * 60) / (90 + 60)
     assert found["contact within ±20 % of the force, %"] == pytest.approx(100 * within)
@@ -67,4 +67,4 @@ def test_all_chairs_together_are_shares_of_all_their_waypoints_and_contact():
 
 def test_a_folder_that_is_no_demonstration(tmp_path):
     with pytest.raises(DataError, match=r"has no ladder-back, .*nrdf demo --out"):
-        drive(tmp_path, lambda name: None)
+        simulate_demo(tmp_path, lambda name: None)

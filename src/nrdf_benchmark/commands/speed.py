@@ -1,0 +1,105 @@
+"""`nrdf eval speed`: speed and memory of retrieval, transfer and training."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nrdf.commands.console import console, errors, show, table, versions
+from nrdf.commands.one_run import one_run_at
+from nrdf.io.bounds import Count, CountFromZero
+
+if TYPE_CHECKING:
+    from nrdf_benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
+    from nrdf_benchmark.transfer_speed import TransferSpeed
+
+
+@one_run_at("out")
+def speed(
+    preset: tuple[str, ...] = ("default", "paper"),
+    device: str = "cpu",
+    repeats: Count = 7,
+    steps: CountFromZero = 3,
+    out: Path | None = None,
+) -> None:
+    """Measure speed and memory of retrieval, transfer and training.
+
+    8 regions on a target of 8192 points without normals, the reference embedded before; transfer
+    with the chairs' model. Every other measurement runs in a process of its own.
+
+    Example: nrdf eval speed --out speed.json
+
+    Args:
+        preset: Presets to measure.
+        device: cpu, cuda, cuda:N or auto.
+        repeats: Warm retrievals, of which the median is taken.
+        steps: Training steps a stage, of which the median is taken; 0 leaves training out.
+        out: JSON file to write.
+    """
+    from nrdf.io.output import write_json
+    from nrdf_benchmark.latency import measure, to_json
+    from nrdf_benchmark.transfer_speed import measure_transfer
+
+    with errors.status("measuring") as status:
+        retrieval, training, failures = measure(preset, device, repeats, steps, status.update)
+        status.update("transfer")
+        transfer = measure_transfer(device, repeats)
+    show_speeds(retrieval, training, failures)
+    show_transfer_speed(transfer)
+    if out is not None:
+        content = {**to_json(retrieval, training, failures), "transfer": vars(transfer)}
+        write_json(out, {"versions": versions(), **content})
+        console.print(f"wrote {out}")
+
+
+def show_transfer_speed(transfer: TransferSpeed) -> None:
+    """A table of a transfer's time by phase."""
+    from nrdf_benchmark.transfer_speed import TRANSFER_BAR_S
+
+    title = f"\ntransfer, {transfer.regions} regions, {transfer.points} points"
+    shown = table(title, "", "s", "must keep to")
+    shown.add_row("further targets, all files", f"{transfer.wall_s:.2f}", f"{TRANSFER_BAR_S:g}")
+    for phase, seconds in transfer.phases.items():
+        shown.add_row(f"  {phase}", f"{seconds:.2f}", "")
+    shown.add_row("CPU time, all threads", f"{transfer.cpu_s:.2f}", "")
+    show(shown)
+
+
+def show_speeds(
+    retrieval: list[RetrievalSpeed], training: list[TrainingSpeed], failures: list[Failure]
+) -> None:
+    """Two tables, and what could not be measured."""
+    from nrdf_benchmark.latency import BARS
+
+    names = (f"{s.preset} ({s.model}, {s.device})" for s in retrieval)
+    shown = table("retrieval", "", *names, "default must keep to")
+    bars = {
+        "further targets, 8 regions, s": BARS["warm_s"],
+        "nrdf retrieve, cold shell, s": BARS["command_s"],
+        "peak memory, GB": BARS["peak_memory_bytes"] / 1e9,
+    }
+    rows = [("load weights, s", [s.load_s for s in retrieval])]
+    rows.append(("reference, s", [s.reference_s for s in retrieval]))
+    rows.append(("first target, 8 regions, s", [s.cold_s for s in retrieval]))
+    rows.append(("further targets, 8 regions, s", [s.warm_s for s in retrieval]))
+    for phase in retrieval[0].warm_phases if retrieval else ():
+        rows.append((f"  {phase}", [s.warm_phases[phase] for s in retrieval]))
+    rows.append(("nrdf retrieve, cold shell, s", [s.command_s or 0.0 for s in retrieval]))
+    rows.append(("peak memory, GB", [s.peak_memory_bytes / 1e9 for s in retrieval]))
+    for name, values in rows:
+        bar = f"{bars[name]:g}" if name in bars else ""
+        shown.add_row(name, *(f"{value:.3f}" for value in values), bar)
+    show(shown)
+    shown = table(
+        "\ntraining", "preset", "stage", "batch", "precision", "s/step", "points/s", "memory, GB"
+    )
+    for t in training:
+        memory = (t.device_memory_bytes or t.peak_memory_bytes) / 1e9
+        shown.add_row(
+            f"{t.preset} ({t.device})", t.stage, str(t.batch_size), t.precision,
+            f"{t.step_s:.3f}", f"{t.points_per_s:,.0f}", f"{memory:.2f}",
+        )  # fmt: skip
+    if training:
+        show(shown)
+    for failure in failures:
+        console.print(f"{failure.preset}, {failure.what}: {failure.reason}", style="yellow")
