@@ -22,3 +22,19 @@ def untrained(tmp_path_factory):
     shapes = {"family": {"count": 3, "licences": {"MIT": 3}}}
     save_weights(path, field, {"category": "chair", "shapes": shapes, "scores": {"own": 0.5}})
     return path
+
+
+@pytest.fixture(scope="session")
+def arm():
+    """The bundled arm."""
+    from nrdf.robot.model.arm import load_arm
+
+    return load_arm()
+
+
+@pytest.fixture(scope="session")
+def plate_job(tmp_path_factory):
+    """The folder of a job on a plate of 0.3 m with one region; not to be written into."""
+    from builders.plate_job import write_plate_job
+
+    return write_plate_job(tmp_path_factory.mktemp("plate"))

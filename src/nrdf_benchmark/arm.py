@@ -12,8 +12,9 @@ import numpy as np
 from nrdf.bundled import TARGETS
 from nrdf.errors import DataError
 from nrdf.robot.model.arm import load_arm
-from nrdf.robot.report.metrics import report_of
-from nrdf.robot.simulation.simulate import read_work, simulate
+from nrdf.robot.report.content import simulation_report
+from nrdf.robot.simulation.job import read_simulation_job
+from nrdf.robot.simulation.simulate import simulate
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,9 @@ def simulate_demo(folder: Path, progress: Callable[[str], None]) -> dict[str, di
         raise DataError(f"{folder} has no {', '.join(missing)}: nrdf demo --out {folder} first")
     reports = {}
     for name in TARGETS:
-        job = read_work(folder / name)
+        job = read_simulation_job(folder / name)
         progress(name)
-        reports[name] = report_of(simulate(job, load_arm()))
+        reports[name] = simulation_report(simulate(job, load_arm()))
     return reports
 
 

@@ -1,17 +1,10 @@
-"""The bundled arm, and a job on a plate, as fixtures."""
+"""A job on a plate, in its folder."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from nrdf.robot.model.arm import load_arm
 from nrdf.toolpath.types import Segment, ToolPath
-
-
-@pytest.fixture(scope="module")
-def arm():
-    return load_arm()
 
 
 def write_job_on(folder, points, normals, region, segments):
@@ -40,8 +33,7 @@ def write_job_on(folder, points, normals, region, segments):
     return folder
 
 
-@pytest.fixture(scope="module")
-def job(tmp_path_factory):
+def write_plate_job(folder):
     """A plate of 0.3 m with one region, in its folder."""
     rng = np.random.default_rng(0)
     flat = rng.uniform(-0.15, 0.15, (2500, 2))
@@ -54,4 +46,4 @@ def job(tmp_path_factory):
         line = np.stack([np.linspace(-0.1, 0.1, 9), np.full(9, 0.42), np.full(9, z)], axis=1)
         segments.append(Segment("process", number, line, turned, 0.1, 10.0))
     whole = np.concatenate([top, below]), np.concatenate([up, -up])
-    return write_job_on(tmp_path_factory.mktemp("job"), *whole, 2500, segments)
+    return write_job_on(folder, *whole, 2500, segments)

@@ -71,9 +71,9 @@ def use(folder):
     export_job(whole, WRITTEN, out)
     if find_spec("mujoco") is None:
         return whole, None
-    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.job import read_simulation_job
 
-    return whole, read_work(folder)
+    return whole, read_simulation_job(folder)
 
 
 def check(folder):

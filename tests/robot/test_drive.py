@@ -12,8 +12,8 @@ if find_spec("mujoco") is None:
     pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
 from nrdf.robot.model.arm import load_arm
-from nrdf.robot.model.cell import Cell, Placement, upright_turn
-from nrdf.robot.model.signed_distance import solid_from_points
+from nrdf.robot.model.cell import Cell, Placement, upright_rotation
+from nrdf.robot.model.signed_distance import distance_field_from_points
 from nrdf.robot.model.tool import tool_of
 from nrdf.robot.planning.follow import follow
 from nrdf.robot.planning.inverse_kinematics import Library
@@ -23,7 +23,7 @@ from nrdf.robot.simulation.collision_free import drive
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.types import Segment, ToolPath
 
-UP = upright_turn(*np.eye(3)[[1, 0]])
+UP = upright_rotation(*np.eye(3)[[1, 0]])
 WALL = 0.10
 PLACE = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,))
 
@@ -56,8 +56,8 @@ def scene():
     path = ToolPath(
         "top", "sand", "disc", 0.025, (Segment("process", 0, positions, down, 0.1, 10.0),)
     )
-    solid = solid_from_points(points, normals)
-    cell = Cell.build(load_arm(), tool_of(path), solid, PLACE, UP)
+    distance_field = distance_field_from_points(points, normals)
+    cell = Cell.build(load_arm(), tool_of(path), distance_field, PLACE, UP)
     library = Library.build(cell, 20_000, rng)
     return cell, library, lines_of(path), Surface(points, normals)
 
@@ -108,6 +108,10 @@ def test_what_touches_is_left_out_and_said(scene, strokes):
 def test_the_object_turns_about_the_turntables_axis(scene):
     cell = scene[0]
     placed = Cell.build(
-        cell.arm, cell.tool, cell.solid, Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0, 0.7)), UP
+        cell.arm,
+        cell.tool,
+        cell.distance_field,
+        Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0, 0.7)),
+        UP,
     )
     np.testing.assert_allclose(cell.turned(np.array([0.7])).poses[0], placed.poses[1], atol=1e-12)

@@ -18,12 +18,12 @@ from builders.plate_job import write_job_on
 from nrdf.errors import ProcessError, RobotError
 from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.robot.model.arm import BUNDLED, load_arm
-from nrdf.robot.model.cell import Cell, Placement, upright_turn
-from nrdf.robot.model.signed_distance import _without_specks, solid_from_points
+from nrdf.robot.model.cell import Cell, Placement, upright_rotation
+from nrdf.robot.model.signed_distance import _without_specks, distance_field_from_points
 from nrdf.robot.model.spheres import cover_box, cover_capsule, cover_cylinder
 from nrdf.robot.model.tool import tool_of
 from nrdf.robot.planning.inverse_kinematics import Library, errors, solve
-from nrdf.robot.planning.timing import STEP_S, timed
+from nrdf.robot.planning.timing import STEP_S, time_parameterize
 from nrdf.toolpath.frames import surface_frames
 from nrdf.toolpath.types import Segment, ToolPath
 
@@ -38,7 +38,7 @@ def bowl():
     way[:, 1] = -np.abs(way[:, 1])
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     points = np.concatenate([0.20 * way, 0.17 * way])
-    return solid_from_points(points, np.concatenate([way, -way]))
+    return distance_field_from_points(points, np.concatenate([way, -way]))
 
 
 def path_of(positions=((0.0, 0.2, 0.0), (0.05, 0.2, 0.0)), force=10.0):
@@ -50,7 +50,7 @@ def path_of(positions=((0.0, 0.2, 0.0), (0.05, 0.2, 0.0)), force=10.0):
 
 @pytest.fixture(scope="module")
 def cell(arm, bowl):
-    return Cell.build(arm, tool_of(path_of()), bowl, PLACE, upright_turn(*np.eye(3)[[1, 0]]))
+    return Cell.build(arm, tool_of(path_of()), bowl, PLACE, upright_rotation(*np.eye(3)[[1, 0]]))
 
 
 def test_the_bundled_arm_has_a_ur10es_reach_and_limits(arm):
@@ -132,20 +132,20 @@ def test_a_concave_object_is_not_swallowed_by_its_hull(bowl):
 
 def test_timing_keeps_feed_and_limits(arm):
     joints = np.linspace([0.0] * 6, [0.4] * 6, 21)
-    calm = timed(arm.chain, joints, np.full(20, 0.1))
+    calm = time_parameterize(arm.chain, joints, np.full(20, 0.1))
     assert len(calm.joints) * STEP_S == pytest.approx(2.0, rel=0.2)
     assert (calm.pace == 1.0).all()
-    hurried = timed(arm.chain, joints, np.full(20, 0.001))
+    hurried = time_parameterize(arm.chain, joints, np.full(20, 0.001))
     assert (np.abs(hurried.speeds) <= arm.chain.speeds * 1.001).all()
     assert (hurried.pace[:-1] < 1.0).all()
     np.testing.assert_allclose(hurried.speeds[[0, -1]], 0.0, atol=1e-6)
 
 
 def test_the_force_sensor_feels_the_push_and_not_the_weight(cell):
-    from nrdf.robot.simulation.scene import Machine
+    from nrdf.robot.simulation.scene import SimulatedArm
 
     still = np.array([0.0, -1.5, 1.5, -1.2, -1.57, 0.0])
-    machine = Machine(cell, still)
+    machine = SimulatedArm(cell, still)
     for push in (0.0, 20.0):
         for _ in range(300):
             tip, axis = machine.tip()
@@ -202,22 +202,23 @@ def test_a_urdf_keeps_its_speed_limits_and_says_which_meshes_are_missing(tmp_pat
 
 
 def test_a_folder_that_is_no_whole_job(tmp_path):
-    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.toolpath.file import write_toolpaths
     from nrdf.toolpath.types import Job
 
     write_toolpaths(tmp_path, Job("chair", "target", (path_of(),)))
     with pytest.raises(ProcessError, match=r"has no knowledge\.yaml"):
-        read_work(tmp_path)
+        read_simulation_job(tmp_path)
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (0.0, 0.005, 0.0), (0.0, -0.005, 0.0)])
-def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
-    from nrdf.robot.simulation.simulate import read_work, simulate
+def test_force_is_kept_on_an_object_that_is_5_mm_off(plate_job, arm, shift):
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
-    done = simulate(read_work(job), arm, placement=place, shift_m=shift)
-    out = done.paths[0].outcome
+    done = simulate(read_simulation_job(plate_job), arm, placement=place, shift_m=shift)
+    out = done.paths[0].metrics
     assert out.reached == out.waypoints == 27
     assert out.force_within is not None and out.force_within > 0.95
     assert out.achieved.worked == pytest.approx(out.planned.worked, abs=0.03)
@@ -228,7 +229,7 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(job, arm, shift):
     assert not done.paths[0].collisions
 
 
-def turned_job(job, folder, pose):
+def turned_job(plate_job, folder, pose):
     """The plate's job, its object and tool paths, in another frame."""
     import nrdf
     from nrdf.toolpath.file import read_toolpaths, write_toolpaths
@@ -238,28 +239,30 @@ def turned_job(job, folder, pose):
         positions = pose.to_scan(segment.positions)
         return replace(segment, positions=positions, quaternions_xyzw=held.as_quat())
 
-    (folder / "knowledge.yaml").write_text((job / "knowledge.yaml").read_text())
-    cloud = nrdf.read_cloud(job / "target.ply")
+    (folder / "knowledge.yaml").write_text((plate_job / "knowledge.yaml").read_text())
+    cloud = nrdf.read_cloud(plate_job / "target.ply")
     normals = cloud.normals @ pose.rotation.T
     nrdf.write_cloud(
         folder / "target.ply", replace(cloud, points=pose.to_scan(cloud.points), normals=normals)
     )
-    whole = read_toolpaths(job)
+    whole = read_toolpaths(plate_job)
     paths = tuple(replace(p, segments=tuple(map(turned, p.segments))) for p in whole.paths)
     write_toolpaths(folder, replace(whole, paths=paths, pose=pose))
     return folder
 
 
 @pytest.mark.parametrize("up", ["z", "-x", "0.2 0.3 0.9"])
-def test_a_job_stands_upright_in_the_cell_as_its_pose_says(job, tmp_path, up):
-    from nrdf.robot.simulation.simulate import read_work
+def test_a_job_stands_upright_in_the_cell_as_its_pose_says(plate_job, tmp_path, up):
+    from nrdf.robot.simulation.job import read_simulation_job
 
     rotation = upright(up_axis(up)) @ about_up(0.4)
     pose = Similarity(rotation, np.array([2.0, -1.0, 5.0]), 1.0)
-    work = read_work(turned_job(job, tmp_path, pose))
+    work = read_simulation_job(turned_job(plate_job, tmp_path, pose))
     assert work.origin == "the object stands as the job's pose says" and not work.assumed
-    solid = solid_from_points(work.points, work.normals)
-    (there,) = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,)).T_cell_object(solid, work.upright)
+    distance_field = distance_field_from_points(work.points, work.normals)
+    (there,) = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,)).T_cell_object(
+        distance_field, work.upright
+    )
     np.testing.assert_allclose(there[:3, :3] @ rotation[:, 1], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(there[:3, :3] @ rotation[:, 0], [1, 0, 0], atol=1e-9)
     points = work.points @ there[:3, :3].T + there[:3, 3]
@@ -269,36 +272,39 @@ def test_a_job_stands_upright_in_the_cell_as_its_pose_says(job, tmp_path, up):
     np.testing.assert_allclose(middle[:2], 0.0, atol=0.01)
 
 
-def test_a_job_that_lies_is_driven_as_one_that_stands(job, arm, tmp_path):
-    from nrdf.robot.report.metrics import report_of
-    from nrdf.robot.simulation.simulate import read_work, simulate
+def test_a_job_that_lies_is_driven_as_one_that_stands(plate_job, arm, tmp_path):
+    from nrdf.robot.report.content import simulation_report
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     pose = Similarity(upright(up_axis("z")), np.zeros(3), 1.0)
     place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
-    report = report_of(simulate(read_work(turned_job(job, tmp_path, pose)), arm, placement=place))
+    report = simulation_report(
+        simulate(read_simulation_job(turned_job(plate_job, tmp_path, pose)), arm, placement=place)
+    )
     assert report["total"]["reached_share"] == 1.0
     assert report["placement"]["up"] == pytest.approx([0, 0, 1])
     assert not any("how its object lies" in line for line in report["warnings"])
 
 
-def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_to_be(job):
-    from nrdf.robot.simulation.simulate import read_work
+def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_to_be(plate_job):
+    from nrdf.robot.simulation.job import read_simulation_job
 
-    work = read_work(job)
+    work = read_simulation_job(plate_job)
     np.testing.assert_allclose(work.upright[[2, 0]], np.eye(3)[[1, 0]], atol=1e-12)
     assert work.assumed and "taken to have +Y up and +X ahead" in work.origin
-    given = read_work(job, "z")
+    given = read_simulation_job(plate_job, "z")
     np.testing.assert_allclose(given.upright[[2, 0]], np.eye(3)[[2, 0]], atol=1e-12)
     assert not given.assumed and given.origin == "up is z, as given"
 
 
-def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
+def test_each_path_is_measured_with_the_process_that_made_it(plate_job, tmp_path):
     from nrdf.process.knowledge_file import read_knowledge, write_knowledge
-    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 
     for name in ("target.ply", "knowledge.yaml"):
-        (tmp_path / name).write_bytes((job / name).read_bytes())
+        (tmp_path / name).write_bytes((plate_job / name).read_bytes())
     knowledge = read_knowledge(tmp_path / "knowledge.yaml")
     (sand,) = knowledge.regions[0].processes
 
@@ -308,22 +314,23 @@ def test_each_path_is_measured_with_the_process_that_made_it(job, tmp_path):
             tmp_path / "knowledge.yaml", knowledge.model_copy(update={"regions": [region]})
         )
 
-    whole = read_toolpaths(job)
+    whole = read_toolpaths(plate_job)
     (path,) = whole.paths
     second = sand.model_copy(update={"name": "sand 2", "edge_margin_m": 0.05})
     write(sand, second)
     write_toolpaths(tmp_path, replace(whole, paths=(replace(path, process="sand 2"), path)))
-    assert [p.edge_margin_m for p in read_work(tmp_path).processes] == [0.05, 0.0]
+    assert [p.edge_margin_m for p in read_simulation_job(tmp_path).processes] == [0.05, 0.0]
     # A job of before: nothing tells which of the two it was.
     write(sand, second.model_copy(update={"name": None}))
     write_toolpaths(tmp_path, whole)
     with pytest.raises(ProcessError, match=r"'sand' on 'top' may be of 2 processes of that name"):
-        read_work(tmp_path)
+        read_simulation_job(tmp_path)
 
 
 def test_force_is_kept_over_a_bend_that_few_waypoints_tell(arm, tmp_path):
     """Between waypoints 40 degrees apart the way is straight, 3 mm below a roller's skin."""
-    from nrdf.robot.simulation.simulate import read_work, simulate
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     rng = np.random.default_rng(0)
     turn, z = rng.uniform(0.0, 2.0 * np.pi, 6000), rng.uniform(-0.15, 0.15, 6000)
@@ -336,9 +343,11 @@ def test_force_is_kept_over_a_bend_that_few_waypoints_tell(arm, tmp_path):
     line = 0.05 * outward + [0.0, 0.4, 0.0]
     segments = [Segment("process", 0, line, held.as_quat(), 0.04, 10.0)]
     folder = write_job_on(tmp_path, points[order], out[order], 2000, segments)
-    done = simulate(read_work(folder), arm, placement=Placement((0.75, 0, 0.3), np.pi, 0.3, (0.0,)))
-    assert done.paths[0].outcome.reached == 4
-    assert done.paths[0].outcome.force_within > 0.95
+    done = simulate(
+        read_simulation_job(folder), arm, placement=Placement((0.75, 0, 0.3), np.pi, 0.3, (0.0,))
+    )
+    assert done.paths[0].metrics.reached == 4
+    assert done.paths[0].metrics.force_within > 0.95
 
 
 def test_single_nodes_on_the_wrong_side_are_no_part_of_a_solid():
@@ -350,43 +359,45 @@ def test_single_nodes_on_the_wrong_side_are_no_part_of_a_solid():
     np.testing.assert_array_equal(_without_specks(wrong), value)
 
 
-def test_a_robot_that_reaches_nothing(job, arm):
-    from nrdf.robot.simulation.simulate import read_work, simulate
+def test_a_robot_that_reaches_nothing(plate_job, arm):
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     place = Placement((4.0, 0.0, 0.3), np.pi, 0.0, (0.0,))
     with pytest.raises(
         RobotError, match=r"reaches none of the job's waypoints from its base at 4\.00"
     ):
-        simulate(read_work(job), arm, placement=place)
+        simulate(read_simulation_job(plate_job), arm, placement=place)
 
 
-def test_a_job_in_another_unit_and_in_another_frame(job, tmp_path):
+def test_a_job_in_another_unit_and_in_another_frame(plate_job, tmp_path):
     from shutil import copytree
 
-    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.job import read_simulation_job
 
     folder = tmp_path / "job"
-    copytree(job, folder)
+    copytree(plate_job, folder)
     content = json.loads((folder / "toolpaths.json").read_text())
     for segment in content["paths"][0]["segments"]:
         segment["positions_m"] = [[1000 * x for x in p] for p in segment["positions_m"]]
     (folder / "toolpaths.json").write_text(json.dumps(content))
     with pytest.raises(ProcessError, match="the two are in different units or frames"):
-        read_work(folder)
+        read_simulation_job(folder)
     content["frame"] = "cell"
     (folder / "toolpaths.json").write_text(json.dumps(content))
     with pytest.raises(
         ProcessError, match="tool paths are in the frame 'cell', its object in 'target'"
     ):
-        read_work(folder)
+        read_simulation_job(folder)
 
 
-def test_the_folder_of_a_simulation(job, arm, tmp_path):
+def test_the_folder_of_a_simulation(plate_job, arm, tmp_path):
     from nrdf.robot.report.folder import write_simulation
-    from nrdf.robot.simulation.simulate import read_work, simulate
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
-    done = simulate(read_work(job), arm, placement=place)
+    done = simulate(read_simulation_job(plate_job), arm, placement=place)
     report = write_simulation(tmp_path, done, "plate", {}, pictures=False)
     assert report["total"]["reached_share"] == 1.0
     assert report["paths"][0]["position_error_m"] < 1e-4

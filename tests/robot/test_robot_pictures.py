@@ -10,18 +10,18 @@ import pytest
 if find_spec("mujoco") is None:
     pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
-from builders.plate_job import arm, job  # noqa: F401
 from nrdf.robot.model.cell import Placement
 from nrdf.robot.report.pictures import COVERAGE, STILL, draw
-from nrdf.robot.simulation.simulate import read_work, simulate
+from nrdf.robot.simulation.job import read_simulation_job
+from nrdf.robot.simulation.simulate import simulate
 
 
-def test_pictures_show_arm_and_object(job, arm, tmp_path):  # noqa: F811
+def test_pictures_show_arm_and_object(plate_job, arm, tmp_path):
     import numpy as np
     from matplotlib.image import imread
 
     place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
-    done = simulate(read_work(job), arm, placement=place)
+    done = simulate(read_simulation_job(plate_job), arm, placement=place)
     missing = draw(tmp_path, done, film=False)
     if missing:
         pytest.skip(missing)

@@ -15,10 +15,10 @@ if find_spec("mujoco") is None:
 
 from scipy.spatial.transform import Rotation
 
-from builders.plate_job import arm, job  # noqa: F401
 from nrdf.errors import ProcessError, RobotError
 from nrdf.robot.model.cell import Placement
-from nrdf.robot.simulation.simulate import read_work, simulate
+from nrdf.robot.simulation.job import read_simulation_job
+from nrdf.robot.simulation.simulate import simulate
 from nrdf.studio import simulator
 from nrdf.studio.playback import EVERY_PATH, FLOOR, playback_of
 from nrdf.studio.player import Player
@@ -33,10 +33,10 @@ def silent(done, total):
 
 
 @pytest.fixture(scope="module")
-def playback(job, arm):  # noqa: F811
+def playback(plate_job, arm):
     # Turned at first, so that the object's turn counts.
     place = Placement((0.75, 0.1, 0.3), np.pi + 0.1, 0.2, (0.4,))
-    return playback_of(simulate(read_work(job), arm, placement=place))
+    return playback_of(simulate(read_simulation_job(plate_job), arm, placement=place))
 
 
 def test_the_pad_is_on_the_object_while_it_works(playback):
@@ -68,7 +68,7 @@ def test_what_a_playback_holds(playback):
 
 
 @pytest.fixture
-def stage(job):  # noqa: F811
+def stage(plate_job):
     """A stage with the plate that the job is on; without a browser."""
     pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
     from nrdf.studio.scene_view import Stage
@@ -81,11 +81,11 @@ def stage(job):  # noqa: F811
     server.stop()
 
 
-def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, job):  # noqa: F811
+def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, plate_job):
     from nrdf.studio.arm_view import Rig
     from nrdf.studio.paintable_cloud import Body
 
-    plate = Body(read_work(job).lesson.cloud)
+    plate = Body(read_simulation_job(plate_job).bound_knowledge.cloud)
     figure = stage.add("plate", plate)
     stage.arrange(["plate"])
     stood = figure.offset
@@ -116,13 +116,13 @@ def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, job):  # noq
 
 
 def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
-    job,  # noqa: F811
+    plate_job,
     tmp_path,
     monkeypatch,
 ):
     monkeypatch.setenv("MUJOCO_GL", "off")  # pictures take long, and have tests of their own
     seen, said = [], []
-    running = Simulator(job)
+    running = Simulator(plate_job)
     made = running.drive(lambda done, total: seen.append(done / total), said.append)
     assert made.report["total"]["waypoints"] == 27 and made.seconds > 5
     assert sorted(set(seen)) == sorted(set(seen), key=seen.index) and 0 < seen[-1] < 1
@@ -142,8 +142,8 @@ def test_what_the_command_line_refuses_is_refused_alike(tmp_path):
         Simulator(tmp_path / "empty").drive(silent)
 
 
-def test_cancelling_ends_the_process(job):  # noqa: F811
-    running = Simulator(job)
+def test_cancelling_ends_the_process(plate_job):
+    running = Simulator(plate_job)
 
     def cancelled(done, total):
         raise Cancelled

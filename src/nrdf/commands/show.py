@@ -192,12 +192,13 @@ def _simulate(folder: Path) -> dict[str, Any] | None:
     from nrdf.errors import NrdfError
     from nrdf.robot.model.arm import load_arm
     from nrdf.robot.report.folder import write_simulation
-    from nrdf.robot.simulation.simulate import read_work, simulate
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
 
     job = folder / REAL
     try:
         with errors.status("the arm") as status:
-            done = simulate(read_work(job), load_arm(), progress=status.update)
+            done = simulate(read_simulation_job(job), load_arm(), progress=status.update)
     except NrdfError as error:  # the demonstration so far is worth keeping
         errors.print(f"no arm: {error}", style="yellow")
         return None

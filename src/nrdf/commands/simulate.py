@@ -55,21 +55,21 @@ def simulate(
     """
     from nrdf.io.output import output_folder
     from nrdf.robot.model.arm import load_arm
-    from nrdf.robot.model.signed_distance import solid_from_file
+    from nrdf.robot.model.signed_distance import distance_field_from_file
     from nrdf.robot.report.folder import write_simulation
-    from nrdf.robot.simulation.simulate import read_work
+    from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.robot.simulation.simulate import simulate as run
 
     with output_folder(out, overwrite, [job, robot, mesh]) as folder:
-        work = read_work(job, up)
+        work = read_simulation_job(job, up)
         arm = load_arm(robot, tool_frame)
         for line in arm.checked:
             console.print(line, style="dim")
         given, count = _placement(base, stand, turns)
-        solid = None if mesh is None else solid_from_file(mesh, work.points)
+        distance_field = None if mesh is None else distance_field_from_file(mesh, work.points)
         with errors.status("simulation") as status:
             shift = tuple(x / 1e3 for x in shift_mm)
-            done = run(work, arm, solid, given, count, shift, seed, status.update)
+            done = run(work, arm, distance_field, given, count, shift, seed, status.update)
         origin = {"command": command_line(), "job": str(job), "versions": versions()}
         with progress_bar("pictures") as progress:
             report = write_simulation(
@@ -104,7 +104,7 @@ def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[
 
 def show_simulation(report: dict[str, Any]) -> None:
     """A table of a simulation's tool paths, what to look at, and the whole."""
-    from nrdf.robot.report.metrics import COLUMNS, figures
+    from nrdf.robot.report.content import COLUMNS, figures
 
     shown = table("", "region", "process", *COLUMNS, texts=2)
     for path in report["paths"]:

@@ -11,14 +11,14 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from nrdf.robot.model.cell import COLUMN_M
-from nrdf.robot.model.engine import mujoco
+from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.planning.timing import STEP_S
-from nrdf.robot.report.metrics import report_of
+from nrdf.robot.report.content import simulation_report
 from nrdf.robot.report.trajectories import rows
-from nrdf.robot.simulation.scene import specification
+from nrdf.robot.simulation.scene import cell_specification
 
 if TYPE_CHECKING:
-    from nrdf.robot.simulation.simulate import DrivenPath, Simulated
+    from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
 
 FLOOR = -1  # the body of what does not move
 EVERY_PATH = -1
@@ -76,13 +76,13 @@ class Playback:
         return int(np.clip(np.searchsorted(self.times, time_s), 0, len(self.times) - 1))
 
 
-def playback_of(simulated: Simulated) -> Playback:
+def playback_of(simulated: SimulationResult) -> Playback:
     """A simulation as it can be shown."""
     shapes: list[Shape] = _standing(simulated)
     parts: dict[str, list[np.ndarray]] = defaultdict(list)
     clock, turn = 0.0, None
     for number, driven in enumerate(simulated.paths):
-        model = specification(driven.cell).compile()
+        model = cell_specification(driven.cell).compile()
         made = _shapes(model, number)
         shapes += [shape for shape in made if number == 0 or shape.path == number]
         mover = _Mover(model, driven, simulated.placement.T_cell_base())
@@ -113,14 +113,14 @@ def playback_of(simulated: Simulated) -> Playback:
         **{name: np.concatenate(values) for name, values in parts.items()},
         T_cell_object=_upright(simulated),
         missed=np.concatenate([_missed(driven) for driven in simulated.paths]),
-        report=report_of(simulated),
+        report=simulation_report(simulated),
     )
 
 
 class _Mover:
     """The bodies' poses in the cell's frame at given joints."""
 
-    def __init__(self, model: Any, driven: DrivenPath, T_cell_base: np.ndarray) -> None:
+    def __init__(self, model: Any, driven: SimulatedPath, T_cell_base: np.ndarray) -> None:
         self._model, self._data = model, mujoco.MjData(model)
         names = driven.cell.arm.joint_names
         self._joints = model.jnt_qposadr[[model.joint(name).id for name in names]]
@@ -190,7 +190,7 @@ def _mesh(model: Any, geom: int) -> trimesh.Trimesh | None:
     return None
 
 
-def _standing(simulated: Simulated) -> list[Shape]:
+def _standing(simulated: SimulationResult) -> list[Shape]:
     """The column of the arm's base and what the object stands on, to see where the floor is."""
     place = simulated.placement
     x, y, z = place.base_m
@@ -208,21 +208,21 @@ def _standing(simulated: Simulated) -> list[Shape]:
     return made
 
 
-def _upright(simulated: Simulated) -> np.ndarray:
+def _upright(simulated: SimulationResult) -> np.ndarray:
     """T_cell_object (4, 4) before the turntable has turned."""
     place = simulated.placement
-    poses = place.T_cell_object(simulated.solid, simulated.work.upright)
+    poses = place.T_cell_object(simulated.distance_field, simulated.simulation_job.upright)
     back = np.eye(4)
     back[:3, :3] = Rotation.from_euler("z", -place.turns_rad[0]).as_matrix()
     return np.asarray(back @ poses[0])
 
 
-def _missed(driven: DrivenPath) -> np.ndarray:
+def _missed(driven: SimulatedPath) -> np.ndarray:
     """Waypoints (k, 3) that are not reached, on the surface."""
     height = driven.process.standoff_m
     places = [
         (line.positions + height * line.axes)[verdict != "reached"]
-        for line, verdict in zip(driven.lines, driven.outcome.verdicts, strict=True)
+        for line, verdict in zip(driven.lines, driven.metrics.verdicts, strict=True)
     ]
     return np.concatenate([np.zeros((0, 3)), *places])
 

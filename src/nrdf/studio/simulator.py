@@ -72,10 +72,11 @@ def _simulate(
     pipe: Connection, job: Path, robot: Path | None, tool_frame: str | None, kept: list[Any]
 ) -> Playback:
     from nrdf.robot.model.arm import load_arm
-    from nrdf.robot.simulation.simulate import read_work, simulate
+    from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import simulate
     from nrdf.studio.playback import playback_of
 
-    work = read_work(job)
+    work = read_simulation_job(job)
     seen: list[str] = []
 
     def phase(what: str) -> None:

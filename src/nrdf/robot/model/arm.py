@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import RobotError, unknown_name
-from nrdf.robot.model.arm_file import compile_arm, delete_worldly, read_arm_file
-from nrdf.robot.model.engine import mujoco
 from nrdf.robot.model.kinematics import Chain
+from nrdf.robot.model.mujoco_model import compile_arm, delete_scene_parts, mujoco, read_arm_file
 from nrdf.robot.model.spheres import COARSE, FINE, Spheres, cover_box, cover_capsule, cover_cylinder
 
 BUNDLED = Path(__file__).with_name("ur10e.xml")
@@ -29,7 +28,7 @@ class Arm:
 
     spec: the MuJoCo specification, without tool. joint_names: of the chain, base first. body:
     name of the body that the tool is mounted on; T_body_flange: (4, 4), of the tool frame in it.
-    spheres: around the arm's own shapes; few_spheres: the same with fewer, larger ones. checked:
+    spheres: around the arm's own shapes; coarse_spheres: the same with fewer, larger ones. checked:
     what was found on loading, in words; warnings: what a person should know before trusting
     results.
     """
@@ -42,7 +41,7 @@ class Arm:
     body: str
     T_body_flange: np.ndarray
     spheres: Spheres
-    few_spheres: Spheres
+    coarse_spheres: Spheres
     checked: tuple[str, ...]
     warnings: tuple[str, ...] = field(default=())
 
@@ -55,7 +54,7 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
     """
     file = BUNDLED if path is None else Path(path)
     spec, warnings = read_arm_file(file)
-    delete_worldly(spec)
+    delete_scene_parts(spec)
     model = compile_arm(spec, file)
     frame, is_site = _tool_frame(model, tool_frame, file)
     chosen = _joints(model, frame, is_site, file)
@@ -95,7 +94,7 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
         body=model.body(body).name,
         T_body_flange=np.linalg.inv(T_world_body) @ T_world_tool,
         spheres=spheres,
-        few_spheres=_spheres(model, chosen, frames, COARSE)[0],
+        coarse_spheres=_spheres(model, chosen, frames, COARSE)[0],
         checked=checked,
         warnings=tuple(warnings),
     )

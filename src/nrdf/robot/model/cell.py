@@ -38,10 +38,12 @@ class Placement:
     def T_cell_base(self) -> np.ndarray:
         return _pose(self.base_yaw_rad, self.base_m)
 
-    def T_cell_object(self, solid: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
-        """Poses (k, 4, 4) of the object's frame at each turn; upright: (3, 3), as `upright_turn`
-        has it."""
-        turned = solid.samples @ upright.T
+    def T_cell_object(self, distance_field: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
+        """Poses (k, 4, 4) of the object's frame at each turn.
+
+        upright: (3, 3), as `upright_rotation` has it.
+        """
+        turned = distance_field.samples @ upright.T
         low, high = turned.min(axis=0), turned.max(axis=0)
         standing = np.eye(4)
         standing[:3, :3] = upright
@@ -49,8 +51,8 @@ class Placement:
         standing[2, 3] = self.stand_m - float(low[2])
         return np.array([_pose(turn, (0.0, 0.0, 0.0)) @ standing for turn in self.turns_rad])
 
-    def T_base_object(self, solid: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
-        return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(solid, upright)
+    def T_base_object(self, distance_field: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
+        return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(distance_field, upright)
 
 
 def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
@@ -61,7 +63,7 @@ def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
     return pose
 
 
-def upright_turn(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
+def upright_rotation(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
     """The rotation (3, 3) from an object's frame to the cell's that takes `up` (3,) to z, and
     `forward` (3,), or what is left of it, to x."""
     up = np.asarray(up, float) / np.linalg.norm(up)
@@ -77,17 +79,17 @@ def upright_turn(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
 class Cell:
     """Everything that clearances are asked of, in the frame of the arm's base.
 
-    chain: with the tool's centre point. spheres: of arm and tool; few: fewer and larger ones, for
-    arm against arm. poses: (k, 4, 4), T_base_object at each turn. turntable_m: (3,) on the
-    turntable's axis. floor_m: its height. pairs: (p, 2) of those that must not meet.
+    chain: with the tool's centre point. spheres: of arm and tool; coarse_spheres: fewer and larger
+    ones, for arm against arm. poses: (k, 4, 4), T_base_object at each turn. turntable_m: (3,) on
+    the turntable's axis. floor_m: its height. pairs: (p, 2) of those that must not meet.
     """
 
     arm: Arm
     tool: Tool
     chain: Chain
     spheres: Spheres
-    few: Spheres
-    solid: SignedDistanceField
+    coarse_spheres: Spheres
+    distance_field: SignedDistanceField
     poses: np.ndarray
     turntable_m: np.ndarray
     floor_m: float
@@ -96,28 +98,32 @@ class Cell:
 
     @staticmethod
     def build(
-        arm: Arm, tool: Tool, solid: SignedDistanceField, placement: Placement, upright: np.ndarray
+        arm: Arm,
+        tool: Tool,
+        distance_field: SignedDistanceField,
+        placement: Placement,
+        upright: np.ndarray,
     ) -> Cell:
         size, flange = arm.chain.size, arm.chain.T_last_tool
         column = _column(-placement.base_m[2])
-        few = arm.few_spheres + column + tool.spheres(size, flange, 4.0)
+        coarse = arm.coarse_spheres + column + tool.spheres(size, flange, 4.0)
         return Cell(
             arm=arm,
             tool=tool,
             chain=arm.chain.with_tool(tool.T_flange_tcp),
             spheres=arm.spheres + column + tool.spheres(size, flange),
-            few=few,
-            solid=solid,
-            poses=placement.T_base_object(solid, upright),
+            coarse_spheres=coarse,
+            distance_field=distance_field,
+            poses=placement.T_base_object(distance_field, upright),
             turntable_m=np.linalg.inv(placement.T_cell_base())[:3, 3],
             floor_m=-placement.base_m[2],
-            pairs=_pairs(arm.chain, few),
+            pairs=_pairs(arm.chain, coarse),
             turns_rad=placement.turns_rad,
         )
 
     def placed(self, placement: Placement, upright: np.ndarray) -> Cell:
         """The same arm, tool and object at another place."""
-        return Cell.build(self.arm, self.tool, self.solid, placement, upright)
+        return Cell.build(self.arm, self.tool, self.distance_field, placement, upright)
 
     def shifted(self, shift_m: np.ndarray) -> Cell:
         """The same with the object off its place by (3,), in its own frame."""
@@ -147,7 +153,7 @@ class Cell:
         centres = self.spheres.at(frames.rotations, frames.places)
         pose = self.poses[turn]
         local = np.matmul(centres - pose[:, None, :3, 3], pose[:, :3, :3])
-        away, gradient = self.solid.distances(local)
+        away, gradient = self.distance_field.distances(local)
         away = away - self.spheres.radii
         # The base stands on the floor.
         low = centres[..., 2] - self.spheres.radii - self.floor_m
@@ -166,15 +172,15 @@ class Cell:
         """Least distance (b,) between parts of arm and tool that are not neighbours."""
         if not len(self.pairs):
             return np.full(len(frames.tcp), np.inf)
-        centres = self.few.at(frames.rotations, frames.places).astype(np.float32)
-        (one, two), size = self.pairs.T, len(self.few.radii)
+        centres = self.coarse_spheres.at(frames.rotations, frames.places).astype(np.float32)
+        (one, two), size = self.pairs.T, len(self.coarse_spheres.radii)
         # All squared distances by one product: the pairs alone, with their offsets, take longer.
         square = np.einsum("bma,bma->bm", centres, centres)
         product = np.matmul(centres, np.swapaxes(centres, 1, 2)).reshape(len(centres), size * size)
         away = square[:, one] + square[:, two]
         away -= 2.0 * product[:, one * size + two]
         away = np.sqrt(np.maximum(away, 0.0))
-        away -= (self.few.radii[one] + self.few.radii[two]).astype(np.float32)
+        away -= (self.coarse_spheres.radii[one] + self.coarse_spheres.radii[two]).astype(np.float32)
         return np.asarray(away.min(axis=1), float)
 
 

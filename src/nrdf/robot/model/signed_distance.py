@@ -76,8 +76,8 @@ class SignedDistanceField:
         return found[..., 0] + np.einsum("...a,...a->...", gradient, offset), gradient
 
 
-def solid_from_points(points: np.ndarray, normals: np.ndarray) -> SignedDistanceField:
-    """A solid from an oriented cloud (n, 3), m: the level set of its winding number.
+def distance_field_from_points(points: np.ndarray, normals: np.ndarray) -> SignedDistanceField:
+    """A signed distance field from an oriented cloud (n, 3), m: its winding number's level set.
 
     The generalised winding number tells inside from outside, holes in the scan or not; marching
     cubes make a mesh of its level set, and the distance is that from the points and from the mesh
@@ -101,13 +101,16 @@ def solid_from_points(points: np.ndarray, normals: np.ndarray) -> SignedDistance
     drop = np.clip(drop, -1.5 * grid.cell, 1.5 * grid.cell)
     vertices = vertices - drop[:, None] * lean
     origin = f"winding number of {len(points)} scanned points, cells of {1e3 * grid.cell:.0f} mm"
-    return grid.solid(value, vertices, faces, np.concatenate([points, vertices]), origin)
+    return grid.distance_field(value, vertices, faces, np.concatenate([points, vertices]), origin)
 
 
-def solid_from_mesh(
+def distance_field_from_mesh(
     vertices: np.ndarray, faces: np.ndarray, origin: str = "mesh"
 ) -> SignedDistanceField:
-    """A solid from a mesh with outward faces, m; parts may overlap, and small holes do no harm."""
+    """A signed distance field from a mesh with outward faces, m.
+
+    Parts may overlap, and small holes do no harm.
+    """
     import trimesh
 
     mesh = trimesh.Trimesh(vertices, faces, process=False)
@@ -116,11 +119,11 @@ def solid_from_mesh(
     samples = np.asarray(trimesh.sample.sample_surface(mesh, wanted, seed=0)[0])
     tree = cKDTree(samples)
     value = grid.filled(tree, lambda nodes: mesh_winding_numbers(vertices, faces, nodes))
-    return grid.solid(value, vertices, faces, samples, origin)
+    return grid.distance_field(value, vertices, faces, samples, origin)
 
 
-def solid_from_file(path: str | Path, points: np.ndarray) -> SignedDistanceField:
-    """A solid from a mesh file, m, of the object whose points (n, 3) are given.
+def distance_field_from_file(path: str | Path, points: np.ndarray) -> SignedDistanceField:
+    """A signed distance field from a mesh file, m, of the object whose points (n, 3) are given.
 
     Raises DataError for a file that cannot be read, and RobotError for a mesh that is not where
     the points are.
@@ -129,14 +132,14 @@ def solid_from_file(path: str | Path, points: np.ndarray) -> SignedDistanceField
 
     vertices, faces = load_mesh(path)
     faces, _ = outer_skin(vertices, faces, 2000, np.random.default_rng(0))
-    solid = solid_from_mesh(vertices, faces, f"mesh {Path(path).name}")
-    far = float(np.median(np.abs(solid.distances(points)[0])))
+    distance_field = distance_field_from_mesh(vertices, faces, f"mesh {Path(path).name}")
+    far = float(np.median(np.abs(distance_field.distances(points)[0])))
     if far > _SAME_M:
         raise RobotError(
             f"the mesh {path} is {1e3 * far:.0f} mm from the job's points, in the middle: it must "
             "be in metres, in the job's frame"
         )
-    return solid
+    return distance_field
 
 
 def _without_specks(value: np.ndarray) -> np.ndarray:
@@ -205,7 +208,7 @@ class _Grid:
         faces = np.asarray(faces)[:, ::-1]  # igl winds them inwards where values grow inwards
         return np.asarray(vertices), faces
 
-    def solid(
+    def distance_field(
         self,
         value: np.ndarray,
         vertices: np.ndarray,

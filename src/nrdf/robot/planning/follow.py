@@ -14,7 +14,7 @@ import numpy as np
 
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import Library
-from nrdf.robot.planning.joint_paths import Stroke, between, with_leads
+from nrdf.robot.planning.joint_paths import Stroke, add_approach_retract, between
 from nrdf.robot.planning.lines import Line
 from nrdf.robot.planning.tracks import Reachability, Tracks, places, tracks_from, tracks_of
 
@@ -136,7 +136,9 @@ def _tried(
         if not hit.any():
             clear.append(k)
     made: list[Stroke | None] = [None] * len(chosen)
-    driven = with_leads(cell, lines, [pieces[k] for k in clear], [found[k][:2] for k in clear])
+    driven = add_approach_retract(
+        cell, lines, [pieces[k] for k in clear], [found[k][:2] for k in clear]
+    )
     for k, stroke in zip(clear, driven, strict=True):
         made[k] = stroke
     return made

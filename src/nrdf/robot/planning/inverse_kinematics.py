@@ -52,7 +52,7 @@ def singular_values(frames: Frames) -> np.ndarray:
     return np.sqrt(np.maximum(squared, 0.0))
 
 
-def improve(
+def damped_least_squares_step(
     chain: Chain,
     frames: Frames,
     joints: np.ndarray,
@@ -108,7 +108,9 @@ def solve(
         if not len(moving) or round_ == rounds:
             break
         frames = _taken(frames, kept)
-        joints[moving] = improve(chain, frames, joints[moving], places[moving], axes[moving])
+        joints[moving] = damped_least_squares_step(
+            chain, frames, joints[moving], places[moving], axes[moving]
+        )
     return joints, good
 
 
@@ -122,7 +124,9 @@ def _taken(frames: Frames, kept: np.ndarray) -> Frames:
     )
 
 
-def wishes(cell: Cell, frames: Frames, joints: np.ndarray, near: Clearance) -> np.ndarray:
+def null_space_gradient(
+    cell: Cell, frames: Frames, joints: np.ndarray, near: Clearance
+) -> np.ndarray:
     """Joint motions (b, n) away from what is nearest, and from the ends of the joints' ranges."""
     chain = cell.chain
     short = np.clip(_WANTED_CLEARANCE - near.least, 0.0, _WANTED_CLEARANCE)

@@ -117,7 +117,7 @@ def _interpolated(number: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
 
 
-def with_leads(
+def add_approach_retract(
     cell: Cell,
     lines: Sequence[Line],
     pieces: Sequence[Piece],

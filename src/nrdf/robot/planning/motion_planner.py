@@ -22,7 +22,7 @@ _MOST_EXTENSIONS = 80
 _SHORTCUTS = 12
 
 
-class Ways:
+class Roadmap:
     """Free moves at one turn of the object, from and to anywhere."""
 
     def __init__(

@@ -28,7 +28,7 @@ _LEAST_ROOM = 0.15  # between the object as it turns and the middle of the base
 def find_placement(
     arm: Arm,
     paths: Sequence[tuple[ToolPath, Sequence[Line]]],
-    solid: SignedDistanceField,
+    distance_field: SignedDistanceField,
     upright: np.ndarray,
     given: Placement | None,
     turns: int,
@@ -37,17 +37,17 @@ def find_placement(
     """The best of a grid of placements, and the share of a sample of waypoints that it reaches at
     some turn; that share alone where a placement is given.
 
-    upright: (3, 3), as `nrdf.robot.model.cell.upright_turn` has it.
+    upright: (3, 3), as `nrdf.robot.model.cell.upright_rotation` has it.
     """
     sample = _sample(paths, rng)
     found: list[tuple[float, Placement]] = []
-    candidates = [given] if given is not None else _candidates(arm, solid, upright, turns)
+    candidates = [given] if given is not None else _candidates(arm, distance_field, upright, turns)
     cells: dict[int, tuple[Cell, Library]] = {}
     for placement in candidates:
         reached = 0.0
         for number, (path, positions, axes) in enumerate(sample):
             if number not in cells:
-                cell = Cell.build(arm, tool_of(path), solid, placement, upright)
+                cell = Cell.build(arm, tool_of(path), distance_field, placement, upright)
                 library = next(
                     (
                         library
@@ -86,12 +86,12 @@ def _sample(
 
 
 def _candidates(
-    arm: Arm, solid: SignedDistanceField, upright: np.ndarray, turns: int
+    arm: Arm, distance_field: SignedDistanceField, upright: np.ndarray, turns: int
 ) -> list[Placement]:
     """Bases around a turntable: distance, height, and whether the object is raised."""
     chain = arm.chain
     reach = float(np.linalg.norm(chain.origins[1:, :3, 3], axis=1).sum())
-    size = np.ptp(solid.samples @ upright.T, axis=0)
+    size = np.ptp(distance_field.samples @ upright.T, axis=0)
     height = float(size[2])
     radius = 0.5 * float(np.hypot(size[0], size[1]))
     angles = tuple((2.0 * np.pi * np.arange(turns) / turns).tolist())

@@ -12,8 +12,8 @@ from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import Library
 from nrdf.robot.planning.joint_paths import Stroke, retreat
 from nrdf.robot.planning.lines import Line
-from nrdf.robot.planning.motion_planner import Ways
-from nrdf.robot.planning.timing import FREE_SHARE, STEP_S, Timed, timed
+from nrdf.robot.planning.motion_planner import Roadmap
+from nrdf.robot.planning.timing import FREE_SHARE, STEP_S, TimedTrajectory, time_parameterize
 
 FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
@@ -38,7 +38,7 @@ class Action:
 
     kind: Kind
     turn: int
-    timed: Timed
+    timed: TimedTrajectory
     line: int = -1
     first: int = 0
     force_n: float | None = None
@@ -88,7 +88,7 @@ class Planner:
     ) -> None:
         self.cell, self.lines, self.home = cell, lines, home
         self._library, self._rng = library, rng
-        self._ways: dict[int, Ways] = {}
+        self._ways: dict[int, Roadmap] = {}
         self._joined: dict[int, tuple[Stroke, Stroke, int | None, int | None]] = {}
         self._free: dict[tuple[int, int, int], Action] = {}
         self._strokes: dict[int, list[Action]] = {}
@@ -130,7 +130,7 @@ class Planner:
 
     def _join(self, stroke: Stroke) -> tuple[Stroke, int | None, int | None]:
         if stroke.turn not in self._ways:
-            self._ways[stroke.turn] = Ways(
+            self._ways[stroke.turn] = Roadmap(
                 self.cell, self._library, stroke.turn, self.home, self._rng
             )
         # With the stroke itself: its number is taken by another when it is gone.
@@ -158,7 +158,7 @@ def _ordered(strokes: Sequence[Stroke]) -> list[Stroke]:
 
 
 def _joined(
-    net: Ways, cell: Cell, stroke: Stroke, home: np.ndarray
+    net: Roadmap, cell: Cell, stroke: Stroke, home: np.ndarray
 ) -> tuple[Stroke, int | None, int | None]:
     """A stroke, and the nodes of its start and end: with a joint a whole turn away, or farther off
     the surface, where that helps; None where nothing does."""
@@ -209,12 +209,12 @@ def _wound(cell: Cell, stroke: Stroke, home: np.ndarray) -> list[Stroke]:
 def _free(cell: Cell, turn: int, way: np.ndarray) -> Action:
     """A free move through corners, at each of which the arm stops."""
     parts = [
-        timed(cell.chain, np.stack([a, b]), np.array([far / FREE_M_S]), FREE_SHARE)
+        time_parameterize(cell.chain, np.stack([a, b]), np.array([far / FREE_M_S]), FREE_SHARE)
         for a, b, far in zip(way[:-1], way[1:], _lengths(cell, way), strict=True)
     ]
     if not parts:
-        parts = [timed(cell.chain, way[:1], np.zeros(0))]
-    joined = Timed(
+        parts = [time_parameterize(cell.chain, way[:1], np.zeros(0))]
+    joined = TimedTrajectory(
         np.concatenate([part.joints for part in parts]),
         np.concatenate([part.speeds for part in parts]),
         np.concatenate([part.place + i for i, part in enumerate(parts)]),
@@ -238,7 +238,7 @@ def _turned(cell: Cell, before: int, after: int, home: np.ndarray) -> Action:
         apart = (apart + np.pi) % (2.0 * np.pi) - np.pi  # the shorter way round
     count = max(int(np.ceil(abs(apart) / TURN_RAD_S / STEP_S)), 1)
     still = np.repeat(home[None], count, axis=0)
-    timing = Timed(still, 0.0 * still, np.zeros(count), np.ones(1))
+    timing = TimedTrajectory(still, 0.0 * still, np.zeros(count), np.ones(1))
     angles = cell.turns_rad[after] - apart * np.linspace(1.0, 0.0, count + 1)[1:]
     return Action("turn", after, timing, angles_rad=angles)
 
@@ -256,7 +256,7 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
             way, number = stroke.way, stroke.at
         tips = cell.chain.frames(way).tcp
         seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
-        timing = timed(cell.chain, way, seconds)
+        timing = time_parameterize(cell.chain, way, seconds)
         nearest = np.searchsorted(np.rint(number), np.arange(len(joints)))
         timing = replace(
             timing,

@@ -14,10 +14,10 @@ from nrdf.robot.planning.inverse_kinematics import (
     LEAST_CLEARANCE_M,
     LEAST_SINGULAR,
     POSITION_M,
+    damped_least_squares_step,
     errors,
-    improve,
+    null_space_gradient,
     singular_values,
-    wishes,
 )
 
 _STEP_RAD, _STEP_SHARE = 0.25, 2.0
@@ -43,7 +43,7 @@ def advance(
     chain = cell.chain
     at, along = cell.to_base(turn, positions, axes)
     frames = chain.frames(joints)
-    wish = wishes(cell, frames, joints, cell.clearance(frames, turn))
+    wish = null_space_gradient(cell, frames, joints, cell.clearance(frames, turn))
     moved = np.clip(joints + np.clip(joints - before, -0.1, 0.1), chain.lower, chain.upper)
     good = np.zeros(len(joints), bool)
     for k in range(_IMPROVEMENTS):
@@ -57,7 +57,9 @@ def advance(
                 break
             todo, frames = todo[~arrived], chain.frames(moved[todo[~arrived]])
         hope = wish[todo] if k == 0 else None
-        moved[todo] = improve(chain, frames, moved[todo], at[todo], along[todo], hope)
+        moved[todo] = damped_least_squares_step(
+            chain, frames, moved[todo], at[todo], along[todo], hope
+        )
     start = chain.frames(joints)
     far, turned = errors(start, at, along)
     allowed = _STEP_RAD + _STEP_SHARE * (turned + far / 0.3)

@@ -19,7 +19,7 @@ _FINE = 4  # places between two waypoints at which limits are looked at
 
 
 @dataclass(frozen=True)
-class Timed:
+class TimedTrajectory:
     """joints (t, n), rad, and their speeds (t, n) at each step of the simulation; place (t,): which
     waypoint the arm is at, a number between 0 and the last; pace (m,): the share of its feed that
     the joints' speed limits leave around each waypoint."""
@@ -35,7 +35,9 @@ class Timed:
         return self.pace < 1.0
 
 
-def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 1.0) -> Timed:
+def time_parameterize(
+    chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 1.0
+) -> TimedTrajectory:
     """Drive through joints (m, n), from rest to rest.
 
     seconds: (m - 1,) that each step would take at its feed; more is taken where joints are at
@@ -46,7 +48,7 @@ def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 
     count = len(joints)
     if count == 1 or np.abs(np.diff(joints, axis=0)).max() < 1e-9:
         still = np.repeat(joints[:1], 2, axis=0)
-        return Timed(still, 0.0 * still, np.array([0.0, count - 1.0]), np.ones(count))
+        return TimedTrajectory(still, 0.0 * still, np.array([0.0, count - 1.0]), np.ones(count))
     limits = share * chain.speeds
     needed = (np.abs(np.diff(joints, axis=0)) / limits).max(axis=1)
     kept = np.minimum(seconds / np.maximum(needed, 1e-9), 1.0)
@@ -66,7 +68,7 @@ def timed(chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 
     steps = np.arange(int(np.ceil(clock[-1] / STEP_S)) + 1) * STEP_S
     at = np.interp(steps, clock, fine)
     rate = np.interp(steps, clock, pace)
-    return Timed(
+    return TimedTrajectory(
         joints=curve(at),
         speeds=curve(at, 1) * rate[:, None],
         place=np.interp(at, knots, np.arange(count)),

@@ -25,7 +25,7 @@ _KEPT, _KEPT_A_TURN = 6, 2
 
 @dataclass(frozen=True)
 class IKSolutions:
-    """Ways to reach targets: joints (b, n), index of the target (b,), turn (b,), worth (b,)."""
+    """Roadmap to reach targets: joints (b, n), index of the target (b,), turn (b,), worth (b,)."""
 
     joints: np.ndarray
     target: np.ndarray

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from nrdf.io.output import REPORT, write_json
-from nrdf.robot.report.metrics import report_of
-from nrdf.robot.report.page import write_page
+from nrdf.robot.report.content import simulation_report
+from nrdf.robot.report.html_report import write_html_report
 from nrdf.robot.report.pictures import draw
 from nrdf.robot.report.trajectories import write_bag, write_csv, write_script
-from nrdf.robot.simulation.simulate import Simulated
+from nrdf.robot.simulation.simulate import SimulationResult
 
 
 def write_simulation(
     folder: Path,
-    simulated: Simulated,
+    simulated: SimulationResult,
     title: str,
     origin: Mapping[str, Any],
     pictures: bool = True,
@@ -30,7 +30,7 @@ def write_simulation(
     report.html, and, where this machine can draw, picture.png, coverage.png and film.webp. Raises
     OutputError if something cannot be written.
     """
-    report = {"title": title, **report_of(simulated), **origin}
+    report = {"title": title, **simulation_report(simulated), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in simulated.seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
     write_csv(folder, simulated)
@@ -41,7 +41,7 @@ def write_simulation(
     if pictures:
         missing = draw(folder, simulated, film, progress)
         report["warnings"] += [missing] if missing else []
-    write_page(folder, report)
+    write_html_report(folder, report)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     report["files"] = [*files, REPORT]
     write_json(folder / REPORT, report)

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.io.ply import write_atomically
-from nrdf.robot.model.engine import mujoco
+from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.simulation.execute import Log
-from nrdf.robot.simulation.scene import specification
-from nrdf.robot.simulation.simulate import DrivenPath, Simulated
+from nrdf.robot.simulation.scene import cell_specification
+from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
 from nrdf.viz.picture import region_colours
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ _LEFT_OUT = (0.93, 0.70, 0.20)
 
 def draw(
     folder: Path,
-    simulated: Simulated,
+    simulated: SimulationResult,
     film: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> str | None:
@@ -55,7 +55,7 @@ def draw(
     return None
 
 
-def _longest(driven: DrivenPath) -> int:
+def _longest(driven: SimulatedPath) -> int:
     return max((len(log.joints) for log in driven.logs if log.action.kind == "process"), default=0)
 
 
@@ -76,7 +76,7 @@ def _save(path: Path, image: np.ndarray) -> None:
 def _film(
     path: Path,
     studio: _Studio,
-    simulated: Simulated,
+    simulated: SimulationResult,
     progress: Callable[[int, int], None],
 ) -> None:
     """Evenly through the whole time, faster than it was."""
@@ -110,7 +110,7 @@ class _Drawn:
 class _Studio:
     """The cell with the object's mesh in the colours of its regions, or of what was covered."""
 
-    def __init__(self, simulated: Simulated, colours: str) -> None:
+    def __init__(self, simulated: SimulationResult, colours: str) -> None:
         self.simulated = simulated
         self._parts = _parts(simulated, colours)
         self._drawn: dict[str, _Drawn] = {}
@@ -125,7 +125,9 @@ class _Studio:
         for renderer in self._renderers.values():
             renderer.close()
 
-    def image(self, driven: DrivenPath, item: Log, at: int, width: int, height: int) -> np.ndarray:
+    def image(
+        self, driven: SimulatedPath, item: Log, at: int, width: int, height: int
+    ) -> np.ndarray:
         """The cell (h, w, 3) at one step of an action, with the tool path on the object."""
         drawn = self._model(driven)
         pose = driven.cell.poses[item.action.turn]
@@ -151,7 +153,7 @@ class _Studio:
         renderer = self._renderer(driven, width, height)
         camera = mujoco.MjvCamera()
         camera.lookat[:] = pose[:3, :3] @ self._middle() + pose[:3, 3]
-        size = float(np.linalg.norm(np.subtract(*self.simulated.solid.box)))
+        size = float(np.linalg.norm(np.subtract(*self.simulated.distance_field.box)))
         camera.distance, camera.elevation = 1.15 * size + 0.2, -20.0
         camera.azimuth = np.degrees(angle)
         option = mujoco.MjvOption()
@@ -161,7 +163,7 @@ class _Studio:
         return np.asarray(renderer.render())
 
     def _middle(self) -> np.ndarray:
-        low, high = self.simulated.solid.box
+        low, high = self.simulated.distance_field.box
         return np.asarray(0.5 * (low + high))
 
     def _place(self, drawn: _Drawn, joints: np.ndarray, pose: np.ndarray) -> None:
@@ -173,13 +175,13 @@ class _Studio:
         drawn.data.mocap_quat[drawn.object_id] = np.roll(quaternion, 1)
         mujoco.mj_forward(drawn.model, drawn.data)
 
-    def _model(self, driven: DrivenPath) -> _Drawn:
+    def _model(self, driven: SimulatedPath) -> _Drawn:
         key = f"{driven.path.tool} {driven.path.tool_radius_m}"
         if key not in self._drawn:
             self._drawn[key] = _build(driven, self._parts)
         return self._drawn[key]
 
-    def _renderer(self, driven: DrivenPath, width: int, height: int) -> Any:
+    def _renderer(self, driven: SimulatedPath, width: int, height: int) -> Any:
         key = (f"{driven.path.tool} {driven.path.tool_radius_m}", width, height)
         if key not in self._renderers:
             model = self._model(driven).model
@@ -188,10 +190,10 @@ class _Studio:
 
 
 def _build(
-    driven: DrivenPath, parts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]
+    driven: SimulatedPath, parts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]
 ) -> _Drawn:
     cell = driven.cell
-    spec = specification(cell)
+    spec = cell_specification(cell)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1440, 1080
     spec.visual.headlight.ambient[:] = 0.42
     spec.visual.headlight.diffuse[:] = 0.42
@@ -228,10 +230,10 @@ def _build(
 
 
 def _parts(
-    simulated: Simulated, colours: str
+    simulated: SimulationResult, colours: str
 ) -> list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
     """The object's mesh cut by colour: vertices, faces and colour of each piece."""
-    solid, lesson = simulated.solid, simulated.work.lesson
+    distance_field, lesson = simulated.distance_field, simulated.simulation_job.bound_knowledge
     points = lesson.cloud.points
     label = np.zeros(len(points), int)
     palette: list[tuple[float, ...]] = [_PLAIN]
@@ -243,13 +245,13 @@ def _parts(
     else:
         palette += [_DONE, _MISSED, _LEFT_OUT]
         for driven in simulated.paths:
-            out = driven.outcome
+            out = driven.metrics
             found = np.where(out.worked, 1, np.where(out.wanted, 2, 3))
             region = lesson.regions[driven.path.region]
             nearest = cKDTree(points[out.region_points]).query(points[region])[1]
             label[region] = found[nearest]
     normals = lesson.cloud.normals
-    corners = solid.vertices[solid.faces]
+    corners = distance_field.vertices[distance_field.faces]
     middle = corners.mean(axis=1)
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-15)
@@ -261,16 +263,16 @@ def _parts(
     owner = label[near[np.arange(len(near)), distance.argmin(axis=1)]]
     made = []
     for number, colour in enumerate(palette):
-        faces = solid.faces[owner == number]
+        faces = distance_field.faces[owner == number]
         if len(faces) >= 4:
             used, index = np.unique(faces, return_inverse=True)
-            made.append((solid.vertices[used], index.reshape(-1, 3), colour))
+            made.append((distance_field.vertices[used], index.reshape(-1, 3), colour))
     return made
 
 
-def _add_lines(scene: Any, driven: DrivenPath, pose: np.ndarray) -> None:
+def _add_lines(scene: Any, driven: SimulatedPath, pose: np.ndarray) -> None:
     """The path's lines, dark where they are driven, red where not."""
-    for line, verdict in zip(driven.lines, driven.outcome.verdicts, strict=True):
+    for line, verdict in zip(driven.lines, driven.metrics.verdicts, strict=True):
         height = driven.process.standoff_m
         places = line.positions + (height - 0.002) * line.axes
         places = places @ pose[:3, :3].T + pose[:3, 3]

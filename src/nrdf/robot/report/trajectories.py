@@ -14,7 +14,7 @@ from nrdf.io.names import spreadsheet_text
 from nrdf.io.ply import write_atomically
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.execute import Log
-from nrdf.robot.simulation.simulate import Simulated
+from nrdf.robot.simulation.simulate import SimulationResult
 
 CSV, BAG, SCRIPT = "joints.csv", "joints.bag", "joints.script"
 EVERY = 10  # steps of the simulation between rows
@@ -26,7 +26,7 @@ def rows(log: Log) -> np.ndarray:
     return np.unique(np.append(np.arange(0, len(log.joints), EVERY), len(log.joints) - 1))
 
 
-def write_csv(folder: Path, simulated: Simulated) -> None:
+def write_csv(folder: Path, simulated: SimulationResult) -> None:
     """Time, what is done, turn of the object, joints (rad) and force (N), a row every 40 ms."""
     names = ",".join(map(_quoted, simulated.arm.joint_names))
     lines = [f"time_s,region,process,move,line,object_turn_rad,{names},force_n"]
@@ -53,7 +53,7 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\r\n') else name
 
 
-def write_bag(folder: Path, simulated: Simulated) -> bool:
+def write_bag(folder: Path, simulated: SimulationResult) -> bool:
     """A JointTrajectory for each move, on a topic a tool path; False where rosbags is missing."""
     try:
         from rosbags.rosbag2 import Writer
@@ -90,7 +90,7 @@ def write_bag(folder: Path, simulated: Simulated) -> bool:
     return True
 
 
-def write_script(folder: Path, simulated: Simulated) -> None:
+def write_script(folder: Path, simulated: SimulationResult) -> None:
     """servoj for every row; stops where the object must be turned or the tool changed.
 
     Raises RobotError for an arm of other than six axes, which no UR is.

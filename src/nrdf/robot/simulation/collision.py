@@ -29,14 +29,16 @@ class Collision:
 
 
 @dataclass(frozen=True)
-class Touch:
+class TimedCollision:
     """A collision, and at which of its action's steps (t,) it is."""
 
     collision: Collision
     steps: np.ndarray
 
 
-def touches_of(cell: Cell, region: str, lines: Sequence[Line], log: Log) -> list[Touch]:
+def find_collisions(
+    cell: Cell, region: str, lines: Sequence[Line], log: Log
+) -> list[TimedCollision]:
     """Collisions of the joints that were really driven, at every step."""
     found = []
     action = log.action
@@ -49,7 +51,9 @@ def touches_of(cell: Cell, region: str, lines: Sequence[Line], log: Log) -> list
         hit = away < 0.0
         if hit.any():
             seconds, depth = float(hit.sum() * STEP_S), -float(away.min())
-            found.append(Touch(Collision(region, action.kind, line, what, seconds, depth), hit))
+            found.append(
+                TimedCollision(Collision(region, action.kind, line, what, seconds, depth), hit)
+            )
     return found
 
 

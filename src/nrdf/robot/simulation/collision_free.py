@@ -14,10 +14,10 @@ import numpy as np
 
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import Library
-from nrdf.robot.planning.joint_paths import Piece, Stroke, between, with_leads
+from nrdf.robot.planning.joint_paths import Piece, Stroke, add_approach_retract, between
 from nrdf.robot.planning.lines import Line
 from nrdf.robot.planning.program import Action, PathProgram, Planner
-from nrdf.robot.simulation.collision import Collision, Touch, touches_of
+from nrdf.robot.simulation.collision import Collision, TimedCollision, find_collisions
 from nrdf.robot.simulation.execute import Log, execute
 from nrdf.surface.surface import Surface
 
@@ -59,7 +59,7 @@ def drive(
     there = cell.shifted(shift_m)
     avoided: list[Collision] = []
     logs: dict[int, Log] = {}
-    touches: dict[int, list[Touch]] = {}
+    touches: dict[int, list[TimedCollision]] = {}
     for round_ in range(_MOST_DRIVES):
         planned = planner.program(strokes, in_order=round_ > 0)
         clock("free moves")
@@ -67,7 +67,7 @@ def drive(
         clock("simulation")
         fresh = [log for log in driven if id(log.action) not in logs]
         logs |= {id(log.action): log for log in fresh}
-        touches |= {id(log.action): touches_of(there, region, lines, log) for log in fresh}
+        touches |= {id(log.action): find_collisions(there, region, lines, log) for log in fresh}
         clock("collisions")
         found = [touches[id(action)] for action in planned.actions]
         collisions = tuple(touch.collision for one in found for touch in one)
@@ -106,7 +106,7 @@ def _without(
     again: dict[int, Stroke | None] = {}
     if pieces:
         ways = [(way, at) for way, at, _ in between(cell, lines, pieces)]
-        found = with_leads(cell, lines, pieces, ways)
+        found = add_approach_retract(cell, lines, pieces, ways)
         again = {id(piece): stroke for piece, stroke in zip(pieces, found, strict=True)}
     left: list[Stroke | None] = []
     for stroke in planned.given:

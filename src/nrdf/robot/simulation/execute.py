@@ -21,7 +21,7 @@ from nrdf.robot.model.cell import Cell
 from nrdf.robot.model.tool import PAD_GIVES_M
 from nrdf.robot.planning.program import Action
 from nrdf.robot.planning.timing import STEP_S
-from nrdf.robot.simulation.scene import Machine
+from nrdf.robot.simulation.scene import SimulatedArm
 from nrdf.surface.surface import Surface
 
 SETTLED_SHARE, SETTLES_S = 0.1, 1.5
@@ -69,7 +69,7 @@ def execute(
     action begins at rest, where the one before it ends."""
     if not actions:
         return []
-    machine = Machine(cell, actions[0].timed.joints[0])
+    machine = SimulatedArm(cell, actions[0].timed.joints[0])
     logs = []
     offset, there = 0.0, True
     for action in actions:
@@ -115,7 +115,7 @@ class _Plan:
 
 
 class _Record:
-    def __init__(self, machine: Machine, steps: int) -> None:
+    def __init__(self, machine: SimulatedArm, steps: int) -> None:
         size = len(machine.joints)
         self.joints = np.zeros((steps, size))
         self.tip, self.axis = np.zeros((steps, 3)), np.zeros((steps, 3))
@@ -125,7 +125,7 @@ class _Record:
 
     def add(
         self,
-        machine: Machine,
+        machine: SimulatedArm,
         tip: np.ndarray,
         axis: np.ndarray,
         force: float,
@@ -148,7 +148,7 @@ class _Record:
         )  # fmt: skip
 
 
-def _move(machine: Machine, cell: Cell, action: Action, offset: float) -> tuple[Log, float]:
+def _move(machine: SimulatedArm, cell: Cell, action: Action, offset: float) -> tuple[Log, float]:
     """An action without force; the correction of the line before is taken back on the way."""
     plan = _Plan.of(cell, action)
     count = len(plan.joints)
@@ -175,7 +175,7 @@ def _move(machine: Machine, cell: Cell, action: Action, offset: float) -> tuple[
 
 
 def _press(
-    machine: Machine,
+    machine: SimulatedArm,
     cell: Cell,
     action: Action,
     surface: Surface,

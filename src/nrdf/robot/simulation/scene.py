@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.robot.model.cell import Cell
-from nrdf.robot.model.engine import mujoco
+from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.model.tool import Part
 from nrdf.robot.planning.timing import STEP_S
 
@@ -23,7 +23,7 @@ _COLOURS = {
 _TOOL, _SENSOR, _FORCE = "nrdf_tool", "nrdf_sensor", "nrdf_force"
 
 
-def specification(cell: Cell) -> Any:
+def cell_specification(cell: Cell) -> Any:
     """The arm's specification with motors, tool, sensor and floor, in the frame of its base."""
     spec = cell.arm.spec.copy()
     spec.option.timestep = STEP_S
@@ -78,12 +78,12 @@ def _wxyz(rotation: np.ndarray) -> np.ndarray:
     return np.asarray(np.roll(Rotation.from_matrix(rotation).as_quat(), 1))
 
 
-class Machine:
+class SimulatedArm:
     """The simulated arm: commanded joints in, true joints and the sensor's force out."""
 
     def __init__(self, cell: Cell, start: np.ndarray) -> None:
         self.cell = cell
-        self.model = specification(cell).compile()
+        self.model = cell_specification(cell).compile()
         self.data = mujoco.MjData(self.model)
         ids = [self.model.joint(name).id for name in cell.arm.joint_names]
         self._position = self.model.jnt_qposadr[ids]

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from nrdf.reports.page import note, write_html
-from nrdf.robot.report.metrics import COLUMNS, figures
+from nrdf.robot.report.content import COLUMNS, figures
 from nrdf.robot.report.pictures import COVERAGE, FILM, STILL
 
 _MOST_LISTED = 40
 
 
-def write_page(folder: Path, report: Mapping[str, Any]) -> None:
+def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
     """Write report.html beside the pictures that it shows. Raises OutputError."""
     parts = [
         _head(report),

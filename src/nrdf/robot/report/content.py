@@ -9,8 +9,8 @@ import numpy as np
 
 from nrdf.robot.model.tool import PAD_GIVES_M
 from nrdf.robot.planning.timing import STEP_S
-from nrdf.robot.report.outcome import FORCE_BAND, VERDICTS
-from nrdf.robot.simulation.simulate import DrivenPath, Simulated
+from nrdf.robot.simulation.metrics import FORCE_BAND, VERDICTS
+from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
 
 COLUMNS = (
     "reached", "region worked · planned", "left out · unreached", "force", "within ±20 %",
@@ -36,7 +36,7 @@ NOTES = (
 )
 
 
-def report_of(simulated: Simulated) -> dict[str, Any]:
+def simulation_report(simulated: SimulationResult) -> dict[str, Any]:
     """Everything that a simulation's report says; SI."""
     paths = [_path(driven) for driven in simulated.paths]
     reached = sum(p["reached"] for p in paths)
@@ -44,7 +44,7 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
     pressed = [p for p in paths if p["force"] is not None]
     contact = sum(p["force"]["seconds"] for p in pressed)
     within = sum(p["force"]["within"] * p["force"]["seconds"] for p in pressed)
-    place, work = simulated.placement, simulated.work
+    place, work = simulated.placement, simulated.simulation_job
     assumed = [f"{work.origin}; --up says otherwise"] if work.assumed else []
     used = sorted({a.turn for d in simulated.paths for a in d.program.actions})
     simulated_s = sum(p["time_s"] for p in paths)
@@ -59,7 +59,7 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
             "joints": list(simulated.arm.joint_names),
             "checked": list(simulated.arm.checked),
         },
-        "object": simulated.solid.origin,
+        "object": simulated.distance_field.origin,
         "placement": {
             "base_m": list(place.base_m),
             "base_yaw_rad": place.base_yaw_rad,
@@ -92,8 +92,8 @@ def report_of(simulated: Simulated) -> dict[str, Any]:
     }
 
 
-def _path(driven: DrivenPath) -> dict[str, Any]:
-    out, path = driven.outcome, driven.path
+def _path(driven: SimulatedPath) -> dict[str, Any]:
+    out, path = driven.metrics, driven.path
     force = None
     if out.force_asked_n is not None and out.force_mean_n is not None:
         force = {

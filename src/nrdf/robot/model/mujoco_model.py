@@ -1,14 +1,39 @@
-"""Robot descriptions: URDF and MJCF files as MuJoCo's specifications."""
+"""MuJoCo, imported when it is needed, and URDF or MJCF files read as its specifications."""
 
 from __future__ import annotations
 
+import importlib
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
 from nrdf.errors import RobotError
-from nrdf.robot.model.engine import mujoco
 
 _LARGEST_FILE = 1 << 24
+
+
+class _Lazy:
+    """The module `mujoco`, imported at the first use.
+
+    MuJoCo looks at MUJOCO_GL once, on import. Without a display only EGL draws, and the default
+    would not.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        if "mujoco" not in sys.modules and sys.platform == "linux":
+            shown = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+            if not shown:
+                os.environ.setdefault("MUJOCO_GL", "egl")
+        try:
+            return getattr(importlib.import_module("mujoco"), name)
+        except ImportError as error:
+            raise RobotError(
+                f"simulation needs the package mujoco ({error}): pip install 'nrdf[robot]'"
+            ) from None
+
+
+mujoco: Any = _Lazy()
 
 
 def read_arm_file(file: Path) -> tuple[Any, list[str]]:
@@ -63,7 +88,7 @@ def _mesh_file(folder: Path, meshdir: str, name: str) -> Path | None:
     return next((place.resolve() for place in places if place.is_file()), None)
 
 
-def delete_worldly(spec: Any) -> None:
+def delete_scene_parts(spec: Any) -> None:
     """Leave out what belongs to a scene rather than to the arm: floors, lights, its own motors."""
     for geom in list(spec.worldbody.geoms):
         if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:

@@ -33,7 +33,7 @@ _FINE_M = 0.005
 
 
 @dataclass(frozen=True)
-class Outcome:
+class PathMetrics:
     """Figures of one tool path.
 
     verdicts: for each line, of its waypoints. position_error_m, axis_error_rad: the worst of
@@ -78,7 +78,7 @@ class Outcome:
         return int(sum((line == verdict).sum() for line in self.verdicts))
 
 
-def outcome(
+def measure_path(
     lesson: BoundKnowledge,
     surface: Surface,
     path: ToolPath,
@@ -89,7 +89,7 @@ def outcome(
     covered: Sequence[np.ndarray],
     why: Sequence[Reachability],
     logs: Sequence[Log],
-) -> Outcome:
+) -> PathMetrics:
     """Figures of a tool path that was driven."""
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
@@ -119,7 +119,7 @@ def outcome(
         kind = log.action.kind
         seconds[kind] = seconds.get(kind, 0.0) + len(log.joints) * STEP_S
     moved = sum(int(log.working.sum()) for log in pressing) * STEP_S
-    return Outcome(
+    return PathMetrics(
         verdicts=verdicts,
         reached=int(sum((line == "reached").sum() for line in verdicts)),
         waypoints=sum(len(line.positions) for line in lines),
