@@ -27,7 +27,7 @@ print(f"longest side {aligned.pose.scale:.3f} {aligned.unit.name} ({aligned.unit
 print("\n".join(aligned.doubts) or "no doubts")
 
 reference, regions = bundled_chair("reference")
-matches = model.set_reference(reference).retrieve_all(regions, aligned.embed())
+matches = model.set_reference(reference).retrieve_all(regions, aligned.encode())
 for name, match in matches.items():
-    match = aligned.in_scan(match)  # indices of the scan's own points
+    match = match.in_scan(aligned)  # indices of the scan's own points
     print(f"{name:11s} {match.presence.reason or len(match.indices)}")

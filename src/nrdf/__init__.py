@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from nrdf.process.knowledge import Knowledge
     from nrdf.process.transfer import ProcessTransfer, TransferResult
     from nrdf.regions.match import Match
-    from nrdf.regions.model import Model
+    from nrdf.regions.model import Model, load_model
     from nrdf.regions.reference import EncodedReference
     from nrdf.reports.job_folder import write_job
     from nrdf.scans.target import align
@@ -77,7 +77,7 @@ _HOMES = {
     **dict.fromkeys(("PointCloud", "read_cloud", "write_cloud"), "nrdf.io.cloud"),
     "as_cloud": "nrdf.io.inputs",
     "Match": "nrdf.regions.match",
-    "Model": "nrdf.regions.model",
+    **dict.fromkeys(("Model", "load_model"), "nrdf.regions.model"),
     "EncodedReference": "nrdf.regions.reference",
     **dict.fromkeys(("ProcessTransfer", "TransferResult"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
@@ -85,21 +85,6 @@ _HOMES = {
     "write_job": "nrdf.reports.job_folder",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
-
-
-def load_model(name: str | Path, device: str = "cpu") -> Model:
-    """The model of a zoo name ("chair"), of a weight file, or of a finished training run's folder.
-
-    `device` is "cpu", "cuda", "cuda:1", … or "auto" (CUDA where there is one). Raises ModelError
-    for a name that is not known (listing those that are) and for a truncated or altered file,
-    ConfigError for a device that this machine does not have.
-    """
-    from nrdf.field.zoo import load_field
-    from nrdf.regions.model import Model
-    from nrdf.training.distributed import choose_device
-
-    field, metadata = load_field(name)
-    return Model(field, metadata, device=choose_device(device))
 
 
 def teach(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:

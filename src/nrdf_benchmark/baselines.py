@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT
 from nrdf.geometry.points import (
     bounding_box,
     canonical_transform,
@@ -16,7 +17,7 @@ from nrdf.geometry.points import (
     fibonacci_directions,
 )
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, snap, voters
+from nrdf.regions.association import VOTERS, snap, voters
 from nrdf.regions.region import region_indices
 from nrdf.shapes.registration import Carriers, RegistrationTemplate
 

@@ -63,7 +63,7 @@ def evaluate_family(
         shared = np.flatnonzero(truth.exists)
         chosen = rng.permutation(shared)[:PLACES]
         taught = model.set_reference(PointCloud(surface.points, surface.normals))
-        embedded = model.embed(PointCloud(other.points, other.normals))
+        embedded = model.encode(PointCloud(other.points, other.normals))
         mapped = embedded.original(taught.map_points(chosen, embedded).points)
         low, high = surface.points.min(0), surface.points.max(0)
         other_low, other_high = other.points.min(0), other.points.max(0)

@@ -16,10 +16,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError
+from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.field.kind import KindNetwork
 from nrdf.geometry.mesh import load_mesh, outer_skin
 from nrdf.geometry.points import canonical_transform, thin
-from nrdf.regions.model import WORKING_POINTS
 from nrdf.scans.kind import KindCheck, check_points
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.target import bring_in

@@ -207,7 +207,7 @@ def _retrieval_speed(
     seconds, phases = [], []
     for target in targets:
         clock.lap()
-        embedded = loaded.embed(target)
+        embedded = loaded.encode(target)
         taught.retrieve_all(regions, embedded)
         seconds.append(clock.lap())
         phases.append(embedded.seconds)
@@ -229,9 +229,9 @@ def _retrieval_speed(
 
 
 def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]:
+    from nrdf.field.device import choose_device, choose_precision
     from nrdf.training.config import load_config
     from nrdf.training.data import ShapeDataset, seeded
-    from nrdf.training.distributed import choose_device, choose_precision
     from nrdf.training.loop import Objective, make_optimizer, select_parts
 
     config = load_config(preset)

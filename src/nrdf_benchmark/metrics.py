@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf_benchmark.bsrc import OPPOSITE_SIDES, ROIS, BenchmarkObject
 
 VERSION = 1

@@ -45,8 +45,8 @@ class DescriptorSearch:
         """Indices into the target's points by region, one for each of the region's points, in
         their order. Raises RegionError and CloudError as `EncodedReference.retrieve_all` does."""
         if self._reference is None or self._reference[0] is not reference:
-            self._reference = (reference, self.model.embed(reference))
-        on_reference, on_target = self._reference[1], self.model.embed(target)
+            self._reference = (reference, self.model.encode(reference))
+        on_reference, on_target = self._reference[1], self.model.encode(target)
         chosen = {
             name: region_indices(region, reference, lambda: on_reference.tree)
             for name, region in regions.items()

@@ -146,7 +146,7 @@ class Finder:
         if isinstance(match, FieldMatch):
             matches = match.find(cloud, regions, seen.embedded)
             if seen.aligned is not None:
-                matches = {name: seen.aligned.in_scan(m) for name, m in matches.items()}
+                matches = {name: m.in_scan(seen.aligned) for name, m in matches.items()}
             found = {name: m.indices for name, m in matches.items()}
         else:
             found = match(cloud, regions, seen.canonical)
@@ -193,14 +193,14 @@ class Finder:
     def _seen(self, key: str, views: int) -> Seen:
         if views == WHOLE:
             labelled = self.whole(key)
-            embedded = self.model.embed(labelled.cloud)
+            embedded = self.model.encode(labelled.cloud)
             return Seen(labelled, embedded, PointCloud(embedded.points, embedded.normals))
         labelled = scan_object(self.mesh(key), views)
         start = time.perf_counter()
         aligned = bring_in(self.judge, labelled.cloud, UP)
         seconds = time.perf_counter() - start
         degrees, scale = pose_error(aligned, labelled.pose)
-        sure, embedded = self._listed[key].forward_sure, aligned.embed()
+        sure, embedded = self._listed[key].forward_sure, aligned.encode()
         return Seen(
             labelled,
             embedded,

@@ -22,6 +22,7 @@ from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Match
 from nrdf.regions.presence import ABSENT
+from nrdf.regions.reference import EncodedReference
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.simulate import ScanSettings, SimulatedScan, simulate_scan
 from nrdf.scans.target import AlignedScan, bring_in
@@ -197,7 +198,8 @@ def score_regions(
     exists = target.locate(taught_on.coordinates).exists
     shared = {r for r, mask in regions.items() if exists[mask].mean() >= SHARED}
     regions = {r: mask for r, mask in regions.items() if r in shared or share[r] == 0}
-    taught = judge.model.set_reference(PointCloud(taught_on.points, taught_on.normals))
+    encoded = judge.model.encode(PointCloud(taught_on.points, taught_on.normals))
+    taught = EncodedReference(judge.model, encoded)
     matches = taught.retrieve_all(regions, PointCloud(surface.points), drop_absent=drop_absent)
     figures = _compare("canonical", pair, matches, surface.points, true, share)
     for kind in KINDS:
@@ -209,8 +211,8 @@ def score_regions(
             cloud, shape = scan.cloud, pose.to_canonical(scan.cloud.points)
             seen = _labels(family, mesh, scan)
         found = bring_in(judge, cloud, UP)
-        matches = taught.retrieve_all(regions, found.embed(), drop_absent=drop_absent)
-        matches = {name: found.in_scan(match) for name, match in matches.items()}
+        matches = taught.retrieve_all(regions, found.encode(), drop_absent=drop_absent)
+        matches = {name: match.in_scan(found) for name, match in matches.items()}
         figures += _compare(kind, pair, matches, shape, seen, share)
     return figures
 

@@ -133,7 +133,7 @@ def score_shape(model: Model, shape: Shape, settings: Settings) -> ShapeScore:
     cloud = shape.surface_points.astype(float)
     cloud = cloud[rng.permutation(len(cloud))[: settings.points]]
     sampling = chamfer_l1(cloud[::2], cloud[1::2])
-    embedded = model.embed(PointCloud(shape.surface_points, shape.surface_normals))
+    embedded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
     queries = embedded.canonical(shape.query_points.astype(float))
     guess = 1 / (1 + np.exp(-np.clip(logits(model, embedded, queries), -50, 50)))
     mse = float(np.mean((guess - shape.query_occupancies) ** 2))

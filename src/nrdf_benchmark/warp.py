@@ -14,13 +14,13 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError, ProcessError
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.correspondence import Correspondence
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.warp import carry
-from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.model import Model
 from nrdf.shapes.families import Family, SurfaceSample, get_family
 from nrdf.shapes.families.member import Member
@@ -85,7 +85,7 @@ def evaluate_warp(
         here = reference.sample_surface(CLOUD_POINTS, rng)
         there = target.sample_surface(CLOUD_POINTS, rng)
         teacher = ProcessTransfer(_lesson(category, family, here), model)
-        embedded = model.embed(PointCloud(there.points, there.normals))
+        embedded = model.encode(PointCloud(there.points, there.normals))
         way = Correspondence(teacher.reference, embedded)
         matches = teacher.taught.retrieve_all(teacher.lesson.regions, embedded)
         named = family.region_of(there.coordinates)

@@ -59,7 +59,7 @@ def test_embedding_and_retrieval(model, teacher, cloud):
         target = PointCloud(points, normals, sensors=sensors)
         found = teacher.taught.retrieve_all({"top": np.arange(50)}, target)
         assert np.isfinite(found["top"].confidence).all()
-        assert torch.isfinite(model.embed(target).z).all()
+        assert torch.isfinite(model.encode(target).z).all()
 
     outcome_of(retrieve)
 

@@ -157,7 +157,7 @@ def test_retrieve_takes_targets_of_every_kind(tmp_path, taught, kind):
         "array": CHAIR.points,
         "trimesh": trimesh.PointCloud(CHAIR.points),
         "open3d": open3d_cloud(CHAIR.points),
-        "embedded": taught.model.embed(tmp_path / "new.ply"),
+        "embedded": taught.model.encode(tmp_path / "new.ply"),
     }[kind]
     expected = taught.retrieve(REGIONS["seat"], PointCloud(CHAIR.points))
     match = taught.retrieve(REGIONS["seat"], target)
@@ -174,7 +174,7 @@ def test_a_mesh_is_a_reference_and_a_target():
 
 def test_what_cannot_be_a_target_is_named(taught):
     for call, name in (
-        (taught.model.embed, "the cloud"),
+        (taught.model.encode, "the cloud"),
         (taught.model.set_reference, "the reference"),
         (lambda given: taught.retrieve(REGIONS["seat"], given), "the target"),
         (lambda given: taught.retrieve_all(REGIONS, given), "the target"),

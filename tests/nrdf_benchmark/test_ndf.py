@@ -178,7 +178,7 @@ def test_minimisation_lowers_the_energy(field, monkeypatch):
     points = np.random.default_rng(0).normal(0, [0.4, 0.2, 0.1], (300, 3))
     model = Model(field, {"category": "chair"})
     search = DescriptorSearch(model, energy=True)
-    shape = model.embed(PointCloud(points))
+    shape = model.encode(PointCloud(points))
     wanted = search._describe(shape, shape.points[:40])
     found = search._tensor(search._minimise(shape, wanted))
     start = search._tensor(shape.points[np.random.default_rng(0).integers(300, size=40)])

@@ -45,7 +45,7 @@ def taught_on(model, reference, scale):
 @pytest.fixture(scope="module")
 def way(model):
     reference = taught_on(model, cloud(), SCALE)
-    return Correspondence(reference, model.embed(cloud(SIZE * SCALE, seed=1)))
+    return Correspondence(reference, model.encode(cloud(SIZE * SCALE, seed=1)))
 
 
 def line_on_top(height=0.0, lead=0.0, tilt=0.0, count=12):
@@ -99,7 +99,7 @@ def test_a_waypoint_alone_keeps_its_angles_too(way):
 
 def test_a_tool_near_a_thin_edge_stays_on_its_side(model):
     thin = taught_on(model, cloud((0.5, 0.9, 0.02)), 1.0)
-    same = Correspondence(thin, model.embed(cloud((0.5, 0.9, 0.02), seed=1)))
+    same = Correspondence(thin, model.encode(cloud((0.5, 0.9, 0.02), seed=1)))
     places = np.stack([np.linspace(-0.2, 0.2, 9), np.zeros(9), np.full(9, 0.01)], axis=1)
     turns = tool_quaternions(np.tile([1.0, 0, 0], (9, 1)), np.tile([0, 0, 1.0], (9, 1)))
     (carried,), lost = carry(same, [TaughtLine(places, turns)], 0.025)
@@ -111,7 +111,7 @@ def test_a_tool_near_a_thin_edge_stays_on_its_side(model):
 def test_a_line_is_cut_where_the_target_has_no_surface(model):
     whole = cloud(seed=1)
     hole = (whole.normals[:, 1] > 0.5) & (np.abs(whole.points[:, 2]) < 0.12)
-    way = Correspondence(taught_on(model, cloud(), 1.0), model.embed(whole.select(~hole)))
+    way = Correspondence(taught_on(model, cloud(), 1.0), model.encode(whole.select(~hole)))
     taught = line_on_top(count=40)
     carried, lost = carry(way, [taught], 0.025)
     assert len(carried) == 2 and [line.taught for line in carried] == [0, 0]
@@ -124,7 +124,7 @@ def test_a_line_is_cut_where_the_surface_is_torn(model):
     """A panel carried to two slats: what would lie in the gap goes to their edges."""
     slats = cloud(count=12_000, seed=1)
     slats = slats.select(~((slats.normals[:, 1] > 0.5) & (np.abs(slats.points[:, 2]) < 0.03)))
-    way = Correspondence(taught_on(model, cloud(), 1.0), model.embed(slats))
+    way = Correspondence(taught_on(model, cloud(), 1.0), model.encode(slats))
     carried, lost = carry(way, [line_on_top(count=60)], 0.025)
     assert len(carried) == 2 and lost == 0
     for line in carried:
@@ -148,7 +148,7 @@ def test_a_direction_follows_the_surface(way):
 def test_a_mirror_image_is_asked_too_and_brought_back(model):
     """An untrained C puts a shape onto itself; so does its mirror image's."""
     reference = TaughtSurface(model.set_reference(cloud()))
-    way = Correspondence(reference, model.embed(cloud(seed=1)))
+    way = Correspondence(reference, model.encode(cloud(seed=1)))
     points, normals = cloud().points[:50], cloud().normals[:50]
     mapped = way._mapped(points, normals)
     np.testing.assert_allclose(way.embedded.original(mapped.points), points, atol=0.01)

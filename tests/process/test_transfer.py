@@ -48,7 +48,7 @@ def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(mod
     moved = PointCloud(turn.apply(target.points) + OFFSET, turn.apply(target.normals), unit="m")
     centre, scale = canonical_transform(target.points)
     pose = Similarity(turn.as_matrix(), turn.apply(centre) + OFFSET, scale)
-    job = ProcessTransfer(transferred.lesson, model).transfer(model.embed(moved, pose))
+    job = ProcessTransfer(transferred.lesson, model).transfer(model.encode(moved, pose))
     assert [step.reason for step in job.paths] == ["", "", "", ""]
     for step, turned in zip(transferred.paths, job.paths, strict=True):
         if step.way != "carry":  # planning breaks ties of direction by the target's axes
@@ -259,7 +259,7 @@ def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
 
 
 def test_points_in_use_are_found_again(model):
-    embedded = model.embed(cloud(count=20_000))
+    embedded = model.encode(cloud(count=20_000))
     some = np.arange(0, 20_000, 3)
     found = working(embedded, some)
     np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))

@@ -10,11 +10,12 @@ from scipy.spatial import cKDTree
 from builders.small_model import COUNT, build, build_doubtful, chair
 from builders.solids import box
 from nrdf.errors import CloudError, RegionError
+from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.field.encoded_cloud import encoder_subset
 from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.process.transfer import MIN_CONFIDENCE
-from nrdf.regions.model import WORKING_POINTS, Model
+from nrdf.regions.model import Model
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.families import get_family
 
@@ -136,7 +137,7 @@ def dense():
 @pytest.mark.parametrize("method", ["mask", "points"])
 def test_a_dense_target_gets_results_for_all_its_points(taught, reference, dense, method):
     cloud, truth = dense
-    embedded = taught.model.embed(cloud)
+    embedded = taught.model.encode(cloud)
     assert len(embedded.working) == len(embedded.points) == WORKING_POINTS < len(cloud)
     match = taught.retrieve(reference[1]["seat"], embedded, method)
     check(match, len(cloud))
@@ -174,7 +175,7 @@ def test_the_target_is_embedded_and_mapped_once_for_all_regions(model, reference
     # Mapped forth, and some of its points back.
     assert calls == ["embed", "invert", "describe", "invert"]
     calls.clear()
-    embedded = model.embed(target)
+    embedded = model.encode(target)
     first = taught.retrieve_all(reference[1], embedded)
     again = taught.retrieve_all(reference[1], embedded, "points")
     assert calls.count("embed") == 1 and calls.count("describe") == 2
@@ -272,7 +273,7 @@ def test_clouds_that_cannot_be_used_are_refused(model, taught, reference):
         taught.retrieve(reference[1]["seat"], PointCloud(flat, normals))
     points[7, 1] = np.nan
     with pytest.raises(CloudError, match="NaN"):
-        model.embed(PointCloud(points))
+        model.encode(PointCloud(points))
 
 
 def test_what_has_no_counterpart_on_the_reference_belongs_to_no_region(taught, reference):
@@ -293,7 +294,7 @@ def test_a_pose_takes_the_place_of_orientation_and_box(taught, reference):
     pose = Similarity(turn, np.array([5.0, -7.0, 9.0]), 30.0)
     own = taught.reference.pose
     scan = PointCloud(pose.to_scan(own.to_canonical(cloud.points)), cloud.normals @ turn.T)
-    embedded = taught.model.embed(scan, pose)
+    embedded = taught.model.encode(scan, pose)
     match = taught.retrieve(masks["seat"], embedded)
     assert overlap(match.indices, masks["seat"]) > 0.95
     np.testing.assert_allclose(match.points, scan.points[masks["seat"]], atol=0.02)
@@ -309,9 +310,9 @@ def test_a_mirrored_half_is_embedded_as_the_whole():
     model = build()
     pose = Similarity(np.eye(3), np.zeros(3), 1.0)
     z, seen, completed = (
-        model.embed(cloud, pose, mirrored).z
+        model.encode(cloud, pose, mirrored).z
         for cloud, mirrored in ((whole, False), (half, False), (half, True))
     )
     assert (completed - z).norm() < 0.3 * (seen - z).norm()
-    points = model.embed(half, pose, mirrored=True).points
+    points = model.encode(half, pose, mirrored=True).points
     assert (points[:, 2] > 0).all(), "only the field sees the mirror image"

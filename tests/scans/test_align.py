@@ -64,7 +64,7 @@ def test_a_partial_scan_is_found_and_its_results_come_back_in_its_own_frame():
     surface = full("chair", CHAIR)
     names = get_family("chair").region_of(surface.coordinates)
     taught = found.judge.model.set_reference(PointCloud(surface.points, surface.normals))
-    match = found.in_scan(taught.retrieve(names == "seat", found.embed()))
+    match = taught.retrieve(names == "seat", found.encode()).in_scan(found)
     inside = PLACE.to_canonical(scan.cloud.points[match.indices])
     seat = surface.points[names == "seat"]
     assert len(inside) > 300
@@ -80,12 +80,12 @@ def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
     coordinates = triangles("chair", CHAIR).at(scan.face, scan.second, scan.third)
     true = family.region_of(coordinates)
     bare = bring_in(judge("chair"), replace(scan.cloud, sensors=None), UP)
-    seen = bring_in(judge("chair"), scan.cloud, UP).embed()
-    two = bare.embed()
+    seen = bring_in(judge("chair"), scan.cloud, UP).encode()
+    two = bare.encode()
     assert len(two.working) > 1.5 * len(np.unique(two.working))
     assert len(seen.working) == len(np.unique(seen.working)), "sensors tell the side"
     taught = bare.judge.model.set_reference(PointCloud(surface.points, surface.normals))
-    match = bare.in_scan(taught.retrieve(names == "seat", two))
+    match = taught.retrieve(names == "seat", two).in_scan(bare)
     assert (np.diff(match.indices) > 0).all() and len(match.confidence) == len(match.indices)
     assert (true == "seat")[match.indices].mean() > 0.9
     assert len(match.indices) > 0.9 * (true == "seat").sum()
@@ -93,7 +93,7 @@ def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
     assert (np.diff(snapped) > 0).all() and (true == "seat")[snapped].mean() > 0.8
     on_seat = np.isin(bare.cleaned.kept, np.flatnonzero(true == "seat"))
     for side, sign in (("seat", 1), ("seat-bottom", -1)):
-        turned = taught.facing({side: names == side}, bare.embed_in_metres("m"))
+        turned = taught.facing({side: names == side}, bare.encode_in_metres("m"))
         up = sign * turned.normals[on_seat[turned.working], 1]
         assert (up > 0).mean() > 0.9, "the side that was asked for"
 
@@ -113,7 +113,7 @@ def test_left_stays_left():
     scan = PointCloud(PLACE.to_scan(surface.points))
     found = bring_in(judge("chair"), scan, UP)
     taught = found.judge.model.set_reference(PointCloud(surface.points, surface.normals))
-    match = found.in_scan(taught.retrieve(left, found.embed()))
+    match = taught.retrieve(left, found.encode()).in_scan(found)
     assert left[match.indices].mean() > 0.9 and len(match.indices) > 0.7 * left.sum()
 
 

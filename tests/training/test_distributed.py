@@ -6,37 +6,16 @@ import os
 import socket
 from pathlib import Path
 
-import pytest
 import torch
 from torch.multiprocessing import spawn
 from torch.nn.parallel import DistributedDataParallel
 
 from builders.tiny_field import TinyField, balls, tiny_config
-from nrdf.errors import ConfigError
 from nrdf.field import PRESETS
 from nrdf.training.checkpoint import latest_checkpoint
 from nrdf.training.data import ShapeDataset
-from nrdf.training.distributed import Workers, choose_device, choose_precision, join_workers
+from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.loop import Objective, run_stages
-
-
-def test_devices_are_checked():
-    assert choose_device("cpu").type == "cpu"
-    with pytest.raises(ConfigError, match="no device 'gpu'; known: auto, cpu, cuda"):
-        choose_device("gpu")
-    if not torch.cuda.is_available():
-        assert choose_device("auto").type == "cpu"
-        with pytest.raises(ConfigError, match="finds no CUDA; use cpu or auto"):
-            choose_device("cuda")
-
-
-def test_precision_is_what_is_asked_for(monkeypatch):
-    cpu = torch.device("cpu")
-    assert choose_precision("bfloat16", cpu) == torch.bfloat16
-    assert choose_precision("float32", cpu) == torch.float32
-    for fast, expected in ((True, torch.bfloat16), (False, torch.float32)):
-        monkeypatch.setattr("nrdf.training.distributed.cpu_has_bfloat16", lambda fast=fast: fast)
-        assert choose_precision("auto", cpu) == expected
 
 
 def test_the_first_process_reports():

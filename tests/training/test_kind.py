@@ -266,11 +266,11 @@ def test_an_aligned_scan_is_checked_in_its_pose():
 
 
 def test_without_a_network_a_target_is_compared_with_the_reference(monkeypatch):
-    monkeypatch.setattr("nrdf.regions.model.find_kind", lambda category: None)
+    monkeypatch.setattr("nrdf.field.cloud_encoder.find_kind", lambda category: None)
     taught = nrdf.load_model("chair").set_reference(PointCloud(member("chair")))
-    same = taught.check_kind(taught.model.embed(PointCloud(member("chair", 1_000_010))))
-    car = taught.check_kind(taught.model.embed(PointCloud(member("car"))))
-    lying = taught.check_kind(taught.model.embed(PointCloud(member("chair")[:, [0, 2, 1]])))
+    same = taught.check_kind(taught.model.encode(PointCloud(member("chair", 1_000_010))))
+    car = taught.check_kind(taught.model.encode(PointCloud(member("car"))))
+    lying = taught.check_kind(taught.model.encode(PointCloud(member("chair")[:, [0, 2, 1]])))
     assert same.fits and same.probability is None and not lying.fits
     assert "the field explains it at a cost of" in car.warnings[0]
 

@@ -192,7 +192,7 @@ def pose_panels(found: AlignedScan) -> list[Panel]:
     """The object in each likely pose, as the category's frame has it."""
     from nrdf.viz.picture import Panel
 
-    seen, panels = found.embed(), []
+    seen, panels = found.encode(), []
     for candidate in found.alignment.likely[:MOST_POSES]:
         turn = found.alignment.best.pose.rotation.T @ candidate.pose.rotation
         points = candidate.pose.to_canonical(seen.original(seen.points))

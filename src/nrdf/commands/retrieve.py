@@ -121,7 +121,7 @@ def retrieve(
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)
         clock.lap("reference")
-        embedded = loaded.embed(target_cloud) if scan is None else scan.embed()
+        embedded = loaded.encode(target_cloud) if scan is None else scan.encode()
         kind = taught.check_kind(embedded) if scan is None else scan.kind
         if scan is None:
             doubts = list(kind.warnings)
@@ -134,7 +134,7 @@ def retrieve(
             target_panel(target.name, embedded, {n: m.indices for n, m in matches.items()}),
         ]
         if scan is not None:
-            matches = {name: scan.in_scan(match) for name, match in matches.items()}
+            matches = {name: match.in_scan(scan) for name, match in matches.items()}
         write_matches(folder, target_cloud, matches)
         draw_regions(panels, folder / "picture.png")
         clock.lap("write")

@@ -174,7 +174,7 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
     aligned = bring_in(PoseScorer(teacher.model), scan.cloud)
-    seen = aligned.embed_in_metres("m")
+    seen = aligned.encode_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
     return teacher.transfer(seen, doubts=aligned.doubts, kind=aligned.kind)

@@ -159,7 +159,7 @@ def transfer(
 
 def _of_scan(scan: AlignedScan, unit: str) -> tuple[EncodedCloud, None, PointCloud]:
     """A scan as `ProcessTransfer.transfer` takes it: embedded in metres, and all of its points."""
-    return scan.embed_in_metres(unit), None, scan.unthinned_in_metres(unit)
+    return scan.encode_in_metres(unit), None, scan.unthinned_in_metres(unit)
 
 
 def _nothing_planned(report: dict[str, Any], category: str, up: str | None) -> str:

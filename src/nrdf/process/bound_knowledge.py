@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import CloudError, NrdfError, ProcessError
+from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.geometry.units import METRES, USUAL_SIZES, guess_unit
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.io.files import open_file
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import listed, read_knowledge
 from nrdf.regions.files import read_region_file
-from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.regions.region import region_indices
 
 log = logging.getLogger(__name__)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.points import estimate_normals, thin
 from nrdf.geometry.units import in_words
 from nrdf.process.bound_knowledge import BoundKnowledge
@@ -15,7 +16,6 @@ from nrdf.process.knowledge import Process
 from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import normals_under, taught_lines
-from nrdf.regions.model import WORKING_POINTS
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface

@@ -8,13 +8,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.field.cloud_encoder import CloudEncoder
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
 from nrdf.geometry.points import thin
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.regions.match import Mapped
-from nrdf.regions.model import Model
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.surface.surface import SAME_SIDE, Surface, unit
@@ -192,10 +191,10 @@ def surface_of(embedded: EncodedCloud) -> Surface:
     return Surface(embedded.original(embedded.points), embedded.original_normals(embedded.normals))
 
 
-def _mirrored(model: Model, embedded: EncodedCloud) -> EncodedCloud:
+def _mirrored(model: CloudEncoder, embedded: EncodedCloud) -> EncodedCloud:
     """The mirror image of what the field works on, left for right, in the canonical frame."""
     image = PointCloud(LEFT_FOR_RIGHT * embedded.points, LEFT_FOR_RIGHT * embedded.normals)
-    return model.embed(image, Similarity(np.eye(3), np.zeros(3), 1.0))
+    return model.encode(image, Similarity(np.eye(3), np.zeros(3), 1.0))
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, get_args
 
 from nrdf.errors import ProcessError, unknown_name
+from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.process.bound_knowledge import bind, checksum, known_unit, overlaps
 from nrdf.process.category import check_category, known_categories
 from nrdf.process.knowledge import Kind, Knowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.regions.files import read_regions
-from nrdf.regions.model import MINIMUM_POINTS
 
 log = logging.getLogger(__name__)
 

@@ -157,7 +157,7 @@ class ProcessTransfer:
             target = as_cloud(target, "the target")
             category = self.lesson.knowledge.category
             known, doubted = unit_and_doubts(target, unit, category, "the target", "unit")
-            embedded = self.model.embed(in_metres(target, known))
+            embedded = self.model.encode(in_metres(target, known))
         if kind is None:
             kind = self.taught.check_kind(embedded)
         if doubts is None:

@@ -5,21 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-NORMAL_WEIGHT = 0.1
-"""Canonical length that one unit of normal difference counts for: tells thin sides apart."""
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+
 VOTERS = 7
 """Mapped reference points that each target point asks."""
 
 
 # Trees are asked by one thread: an interrupt would free the arrays under scipy's other threads.
-
-
-def oriented_features(points: np.ndarray, normals: np.ndarray, weight: float) -> np.ndarray:
-    """Positions and weighted normals side by side, (n, 6), for nearest neighbours in both.
-
-    With weight 0 only the positions, (n, 3), which is faster.
-    """
-    return np.concatenate([points, weight * normals], axis=1) if weight else points
 
 
 def snap(

@@ -9,6 +9,7 @@ import numpy as np
 
 from nrdf.field.base import Inverse
 from nrdf.regions.presence import Presence
+from nrdf.scans.target import AlignedScan
 
 TRUST_SCALE = 0.2
 """Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
@@ -40,6 +41,10 @@ class Match:
     def score(self) -> float:
         """Mean confidence of the region's points; 0 for an empty region."""
         return float(self.confidence.mean()) if len(self.confidence) else 0.0
+
+    def in_scan(self, aligned: AlignedScan) -> Match:
+        """This match, found on an aligned scan's object, with indices of the scan's own points."""
+        return replace(self, indices=aligned.cleaned.kept[self.indices])
 
     def with_presence(self, presence: Presence, drop_absent: bool = True) -> Match:
         """This match, its confidence scaled to the overlap that is to be expected; with

@@ -7,25 +7,23 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
 
 from nrdf.errors import RegionError, unknown_name
-from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.field.cloud_encoder import CloudEncoder
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
 from nrdf.io.inputs import as_cloud
-from nrdf.regions.association import NORMAL_WEIGHT, VOTERS, oriented_features, snap, voters
+from nrdf.regions.association import VOTERS, snap, voters
 from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind import KindCheck, check_kind
-
-if TYPE_CHECKING:
-    from nrdf.regions.model import Model
-    from nrdf.scans.pose_scorer import PoseScorer
+from nrdf.scans.pose_scorer import PoseScorer
 
 log = logging.getLogger(__name__)
 
@@ -37,20 +35,18 @@ _RETURNED = 2048  # of a target's points that are led back to the reference
 class EncodedReference:
     """A reference whose descriptors are known (paper, eq. 8)."""
 
-    def __init__(self, model: Model, reference: EncodedCloud) -> None:
+    def __init__(self, model: CloudEncoder, reference: EncodedCloud) -> None:
         self.model = model
         self.reference = reference
         self._k = self._describe(reference.points, reference.normals)
 
     def check_kind(self, target: EncodedCloud) -> KindCheck:
         """Whether a target looks like an object of the category, upright and facing forward in the
-        pose that it is embedded in; without a network that tells, like the reference."""
+        pose that it is encoded in; without a network that tells, like the reference."""
         return check_kind(self.model, target, lambda: self._judge)
 
     @cached_property
     def _judge(self) -> PoseScorer:
-        from nrdf.scans.pose_scorer import PoseScorer  # a judge needs models
-
         return PoseScorer(self.model, [self.reference.cloud])
 
     @cached_property
@@ -76,10 +72,10 @@ class EncodedReference:
         drop_absent: bool = True,
         check: bool = True,
     ) -> dict[str, Match]:
-        """Find regions on a target, which is embedded and mapped once for all of them.
+        """Find regions on a target, which is encoded and mapped once for all of them.
 
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
-        target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or embedded.
+        target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or encoded.
         Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
         method: "mask" maps the whole reference and lets each target point ask the mapped
         reference points nearest in position and normal; parts of the target that are far from all
@@ -95,7 +91,7 @@ class EncodedReference:
         stands upright and faces forward (`check_kind`).
 
         Raises RegionError for a region that is empty or not on the reference (the message names
-        it) or an unknown method, and CloudError for a target as `Model.embed` does.
+        it) or an unknown method, and CloudError for a target as `CloudEncoder.encode` does.
         """
         if method not in METHODS:
             raise RegionError(unknown_name("method", method, METHODS))
@@ -105,30 +101,30 @@ class EncodedReference:
                 chosen[name] = region_indices(region, reference.cloud, lambda: reference.tree)
             except RegionError as error:
                 raise RegionError(f"region '{name}': {error}") from None
-        embedded = target if isinstance(target, EncodedCloud) else self._embed(target)
-        for warning in self.check_kind(embedded).warnings if check else ():
+        encoded = target if isinstance(target, EncodedCloud) else self._encode(target)
+        for warning in self.check_kind(encoded).warnings if check else ():
             log.warning("%s", warning)
-        surface = self.map_surface(embedded, refine)
+        surface = self.map_surface(encoded, refine)
         start = time.perf_counter()
         if method == "mask":
-            matches = self._by_mask(chosen, embedded, surface)
+            matches = self._by_mask(chosen, encoded, surface)
         else:
             matches = {
-                name: self._by_points(self.map_points(indices, embedded, surface), embedded)
+                name: self._by_points(self.map_points(indices, encoded, surface), encoded)
                 for name, indices in chosen.items()
             }
         # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
-        off = embedded.distance(surface.points - surface.moved, surface.normals)
-        asked = self._returned(embedded)
+        off = encoded.distance(surface.points - surface.moved, surface.normals)
+        asked = self._returned(encoded)
         matches = {
-            name: self._judged(match, chosen[name], embedded, surface, off, asked, drop_absent)
+            name: self._judged(match, chosen[name], encoded, surface, off, asked, drop_absent)
             for name, match in matches.items()
         }
-        embedded.seconds["associate"] = time.perf_counter() - start
+        encoded.seconds["associate"] = time.perf_counter() - start
         return matches
 
-    def _embed(self, target: Any) -> EncodedCloud:
-        return self.model.embed(as_cloud(target, "the target"))
+    def _encode(self, target: Any) -> EncodedCloud:
+        return self.model.encode(as_cloud(target, "the target"))
 
     def map_surface(self, target: EncodedCloud, refine: bool = False) -> Mapped:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""

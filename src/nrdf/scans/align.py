@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.field.yaw import at_yaws
 from nrdf.geometry.points import canonical_transform, estimate_normals, thin
 from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud, check_cloud
-from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
 from nrdf.scans.pose_scorer import PoseScorer, sparse_subset
 

@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from nrdf.field.cloud_encoder import CloudEncoder
+from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.field.kind import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
 from nrdf.geometry.similarity import AXES, up_axis
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.objects import count_objects
-
-if TYPE_CHECKING:
-    from nrdf.field.encoded_cloud import EncodedCloud
-    from nrdf.regions.model import Model
-    from nrdf.scans.pose_scorer import PoseScorer
+from nrdf.scans.pose_scorer import PoseScorer
 
 LEAST = 0.3
 """Probability that an object stands upright and faces forward, below which it is doubted."""
@@ -66,8 +64,10 @@ class KindCheck:
         }
 
 
-def check_kind(model: Model, target: EncodedCloud, judge: Callable[[], PoseScorer]) -> KindCheck:
-    """Check a target that is embedded in the pose in which its regions are to be found.
+def check_kind(
+    model: CloudEncoder, target: EncodedCloud, judge: Callable[[], PoseScorer]
+) -> KindCheck:
+    """Check a target that is encoded in the pose in which its regions are to be found.
 
     judge: gives what is known of the category; it is asked for only without a network.
     """

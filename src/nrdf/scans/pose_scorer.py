@@ -17,12 +17,11 @@ from torch.nn import functional
 
 from nrdf.errors import ModelError
 from nrdf.field.base import Inverse
-from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
+from nrdf.field.cloud_encoder import CloudEncoder
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, encoder_subset
 from nrdf.field.yaw import YawNetwork, find_yaw
 from nrdf.geometry.points import thin
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.association import NORMAL_WEIGHT
-from nrdf.regions.model import Model
 from nrdf.shapes.families import FAMILY_NAMES, get_family
 
 FIRST_SEED = 900_000  # of the members that serve as prototypes; no training set has them
@@ -45,7 +44,7 @@ class PoseScorer:
 
     def __init__(
         self,
-        model: Model,
+        model: CloudEncoder,
         prototypes: Sequence[PointCloud] = (),
         yaw: YawNetwork | None = None,
     ) -> None:
@@ -58,7 +57,7 @@ class PoseScorer:
         self.yaw = yaw or find_yaw(model.category)
         given = list(prototypes) or family_prototypes(model.category)
         self.prototypes = len(given)
-        self._clouds = [model.embed(cloud) for cloud in given]
+        self._clouds = [model.encode(cloud) for cloud in given]
         described = []
         with torch.inference_mode():
             for cloud in self._clouds:
@@ -94,7 +93,7 @@ class PoseScorer:
         return self._fine(points, normals, whole, whole_normals).mean(axis=1)
 
     def cost_of(self, target: EncodedCloud) -> float:
-        """The cost of a target in the pose in which it is embedded."""
+        """The cost of a target in the pose in which it is encoded."""
         return float(self._each_cost(target).mean())
 
     @cached_property

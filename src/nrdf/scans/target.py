@@ -1,4 +1,4 @@
-"""A scan on its way into a model: cleaned, aligned, embedded, and its results on the way back."""
+"""A scan on its way into a model: cleaned, aligned and encoded."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from nrdf.field.cloud_encoder import WORKING_POINTS, CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.geometry.points import thin
 from nrdf.geometry.similarity import Similarity, up_axis
 from nrdf.geometry.units import METRES, Unit, find_unit
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
-from nrdf.regions.match import Match
-from nrdf.regions.model import WORKING_POINTS, Model
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan, unthinned
 from nrdf.scans.kind import KindCheck, by_judge, by_network
@@ -42,19 +41,19 @@ class AlignedScan:
         """The likeliest pose: from canonical coordinates to the scan's."""
         return self.alignment.best.pose
 
-    def embed(self) -> EncodedCloud:
+    def encode(self) -> EncodedCloud:
         """The object as the model's field sees it, in the likeliest pose.
 
         Sheets whose side nothing tells stand for both (`EncodedCloud.two_sided`).
         """
-        seen = self.judge.model.embed(self.cleaned.cloud, self.pose, self._is_one_sided)
+        seen = self.judge.model.encode(self.cleaned.cloud, self.pose, self._is_one_sided)
         return seen.two_sided()
 
-    def embed_in_metres(self, unit: str) -> EncodedCloud:
-        """As `embed`, of the object in metres, its scan being in `unit`."""
+    def encode_in_metres(self, unit: str) -> EncodedCloud:
+        """As `encode`, of the object in metres, its scan being in `unit`."""
         pose = self.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
         cloud = in_metres(self.cleaned.cloud, unit)
-        return self.judge.model.embed(cloud, pose, self._is_one_sided)
+        return self.judge.model.encode(cloud, pose, self._is_one_sided)
 
     def unthinned_in_metres(self, unit: str) -> PointCloud:
         """All points of the object that the scan has, thinned or not, in metres, the scan being in
@@ -65,10 +64,6 @@ class AlignedScan:
     def _is_one_sided(self) -> bool:
         low, high = _ONE_SIDED
         return low < self.alignment.best.symmetry < high
-
-    def in_scan(self, match: Match) -> Match:
-        """A match on the object, its indices those of the scan's points."""
-        return replace(match, indices=self.cleaned.kept[match.indices])
 
     @cached_property
     def kind(self) -> KindCheck:
@@ -105,7 +100,7 @@ class AlignedScan:
 
 
 def align(
-    model: Model,
+    model: CloudEncoder,
     scan: Any,
     up: str = "auto",
     sensors: np.ndarray | None = None,

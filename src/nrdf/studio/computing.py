@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.check import Checked, check_process
 from nrdf.process.transfer import ProcessTransfer, TransferResult, touched
-from nrdf.regions.association import NORMAL_WEIGHT, oriented_features
 from nrdf.studio.document import Document, Loaded, Painted
 from nrdf.studio.paintable_cloud import Body
 from nrdf.studio.separate import Separate, answer, progress_of
@@ -182,7 +182,7 @@ class Computing:
     def _seen(self, file: str) -> EncodedCloud:
         model = self._taught.model
         if (model.category, file) not in self._embedded:
-            self._embedded[model.category, file] = model.embed(self._clouds[file])
+            self._embedded[model.category, file] = model.encode(self._clouds[file])
         return self._embedded[model.category, file]
 
 

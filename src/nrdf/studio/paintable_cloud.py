@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.points import estimate_normals, thin
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.model import WORKING_POINTS
 from nrdf.studio.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
 from nrdf.surface.surface import Surface

@@ -22,12 +22,12 @@ from pydantic import (
 )
 
 from nrdf.errors import NrdfError, OutputError, ProcessError
+from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.io.files import read_file
 from nrdf.io.ply import write_atomically
 from nrdf.io.schema import Strict, explain
 from nrdf.process.new_knowledge import KINDS
-from nrdf.regions.model import MINIMUM_POINTS
 from nrdf.regions.region import region_name_fault
 from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
 from nrdf.errors import CloudError, NrdfError
+from nrdf.field.cloud_encoder import MINIMUM_POINTS, WORKING_POINTS
 from nrdf.geometry.points import thin
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.process.bound_knowledge import known_unit
-from nrdf.regions.model import MINIMUM_POINTS, WORKING_POINTS
 
 LARGEST_UPLOAD = 128 << 20
 ENDINGS = (

@@ -20,6 +20,7 @@ from torch.nn.parallel import DistributedDataParallel
 from nrdf.errors import ConfigError, DataError, TrainingError, unknown_name
 from nrdf.field import build_field
 from nrdf.field.base import Field
+from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
 from nrdf.io.locks import claim
 from nrdf.training.checkpoint import (
@@ -35,7 +36,7 @@ from nrdf.training.checkpoint import (
 )
 from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
 from nrdf.training.data import Batch, ShapeDataset, load_bank, seeded
-from nrdf.training.distributed import Workers, choose_precision, join_workers
+from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance

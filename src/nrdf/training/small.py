@@ -15,6 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import WEIGHTS
 from nrdf.io.locks import claim, writing
@@ -29,7 +30,7 @@ from nrdf.training.checkpoint import (
     save_checkpoint,
     write_identity,
 )
-from nrdf.training.distributed import Workers, choose_precision
+from nrdf.training.distributed import Workers
 from nrdf.training.provenance import environment
 
 log = logging.getLogger(__name__)

@@ -60,9 +60,9 @@ def ablate(
         overwrite: Train anew what the folder holds of these variants and the shared stages.
     """
     import nrdf
+    from nrdf.field.device import choose_device
     from nrdf.training.config import load_config
     from nrdf.training.data import load_bank
-    from nrdf.training.distributed import choose_device
     from nrdf.training.provenance import git_commit, list_shapes
     from nrdf_benchmark import ablation, ablation_table
     from nrdf_benchmark.bsrc import read_bsrc
