@@ -17,7 +17,7 @@ from nrdf.bundled import REAL, bundled_chair
 from nrdf.field.zoo import find_weights, list_models, load_field
 from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.io.ply import read_header, read_scalars
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.transfer import MIN_CONFIDENCE
 

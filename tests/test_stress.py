@@ -20,8 +20,8 @@ from builders.taught_box import cloud
 from nrdf import cli
 from nrdf.errors import OutputError
 from nrdf.export.registry import export_job
-from nrdf.io.locks import claim
-from nrdf.io.swap import MANIFEST
+from nrdf.io.locks import write_lock
+from nrdf.io.result_folder import MANIFEST
 from nrdf.toolpath.file import write_toolpaths
 
 LIMITED = """
@@ -153,7 +153,7 @@ def test_a_place_that_can_only_be_read_is_told_before_anything_is_computed(job, 
 def test_every_verb_refuses_a_place_that_another_run_writes_to(job, words, capsys):
     out = job.parent / "place.ply"
     words = [str(job) if word == "JOB" else word for word in words]
-    with claim(out):
+    with write_lock(out):
         assert cli.run([*words, "--out", str(out)]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert f"another run is writing to {out}" in said
@@ -202,7 +202,7 @@ def test_a_scan_and_its_truth_are_as_they_were_where_writing_fails(tmp_path, mon
     def full(*_):
         raise OutputError("cannot write scan.json: No space left on device")
 
-    monkeypatch.setattr("nrdf.io.output.write_json", full)
+    monkeypatch.setattr("nrdf.io.atomic.write_json", full)
     assert cli.run([*words, "--seed", "1"]) == 2
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
 
@@ -247,7 +247,7 @@ def test_a_picture_on_a_full_disk_is_an_output_error(tmp_path, monkeypatch):
 
 
 def test_a_report_is_whole_or_as_it_was(tmp_path, monkeypatch):
-    from nrdf.io.output import write_json
+    from nrdf.io.atomic import write_json
 
     write_json(tmp_path / "x.json", {"a": 1})
 
@@ -279,7 +279,7 @@ def test_regions_that_would_be_one_file_are_refused(tmp_path, capsys):
 def test_a_second_studio_and_a_second_writer_of_a_data_folder_are_refused(tmp_path, capsys):
     place = str(tmp_path / "place")
     for words in (["studio", "--no-browser", "--session", place], ["correspond", place]):
-        with claim(place):
+        with write_lock(place):
             assert cli.run(words) == 2
         assert "another run is writing to" in " ".join(capsys.readouterr().err.split())
     assert list(tmp_path.iterdir()) == []

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from nrdf.errors import ConfigError, unknown_name
 from nrdf.field.zoo import WEIGHTS
-from nrdf.io.locks import claim
-from nrdf.io.output import write_json
+from nrdf.io.atomic import write_json
+from nrdf.io.locks import write_lock
 from nrdf.training.checkpoint import COST, IDENTITY, open_run
 from nrdf.training.config import TrainConfig
 from nrdf.training.loop import run_identity, train
@@ -133,4 +133,4 @@ def _timed(run: Path) -> Iterator[None]:
 
 def _alone(out: Path, name: str) -> AbstractContextManager[None]:
     """Other processes that want the same run wait meanwhile; `train` refuses a second one."""
-    return claim(out / f"turn at {name}", wait=True)
+    return write_lock(out / f"turn at {name}", wait=True)

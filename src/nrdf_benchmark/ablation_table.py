@@ -17,8 +17,8 @@ import torch
 from nrdf.errors import DataError
 from nrdf.field.base import Field
 from nrdf.field.zoo import WEIGHTS
+from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud
-from nrdf.io.ply import write_atomically
 from nrdf.shapes.families import get_family
 from nrdf.training.data import ShapeDataset, seeded
 from nrdf.training.losses import LOSSES, LossContext

@@ -10,12 +10,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT
-from nrdf.geometry.points import (
-    bounding_box,
-    canonical_transform,
-    estimate_normals,
-    fibonacci_directions,
-)
+from nrdf.geometry.canonical import bounding_box, canonical_transform
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import fibonacci_directions
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.association import VOTERS, snap, voters
 from nrdf.regions.region import region_indices
@@ -123,7 +120,7 @@ def hidden_point_normals(points: np.ndarray) -> np.ndarray:
 
     Line: principal component analysis of 9 neighbours. Sign: hidden-point removal (Katz et al.
     2007) from 60 directions, each direction that sees a point voting for the side it sees it from.
-    Simpler, slower and less often right than `nrdf.geometry.points.estimate_normals`. Raises
+    Simpler, slower and less often right than `nrdf.geometry.normals.estimate_normals`. Raises
     CloudError for an empty cloud.
     """
     centre, scale = canonical_transform(points)

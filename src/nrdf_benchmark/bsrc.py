@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import CloudError, DataError, RegionError, unknown_name
-from nrdf.geometry.points import estimate_normals
+from nrdf.geometry.normals import estimate_normals
 from nrdf.io.cloud import PointCloud, read_cloud
 from nrdf.regions.region import region_indices
 

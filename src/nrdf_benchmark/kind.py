@@ -18,8 +18,10 @@ from scipy.spatial.transform import Rotation
 from nrdf.errors import DataError
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.field.kind import KindNetwork
-from nrdf.geometry.mesh import load_mesh, outer_skin
-from nrdf.geometry.points import canonical_transform, thin
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import outer_skin
+from nrdf.geometry.sampling import downsample
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.scans.kind import KindCheck, check_points
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.target import bring_in
@@ -190,7 +192,7 @@ def summary(figures: list[Figure]) -> list[tuple[str, int, int, str]]:
 
 def _check(network: KindNetwork, category: str, points: np.ndarray) -> KindCheck:
     """The check of a cloud (n, 3) in its own frame, as `Model.embed` would show it."""
-    points = points[thin(points, WORKING_POINTS, np.random.default_rng(0))]
+    points = points[downsample(points, WORKING_POINTS, np.random.default_rng(0))]
     centre, scale = canonical_transform(points)
     return check_points(network, category, (points - centre) / scale, np.eye(3))
 

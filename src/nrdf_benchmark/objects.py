@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import DataError, unknown_name
-from nrdf.geometry.mesh import MOST_FACES, check_mesh, clean_faces
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import MAX_FACES, check_mesh, clean_faces
 from nrdf.io.files import read_file
 from nrdf.io.formats.arrays import Arrays, open_arrays
-from nrdf.io.plain_data import read_json
+from nrdf.io.yaml_json import read_json
 
 LABELS, INDEX = "labels.json", "index.csv"
 IGNORED, BACKGROUND = ("mixed",), ("other",)
@@ -67,8 +67,9 @@ class Listed:
 
 @dataclass(frozen=True)
 class LabelledMesh:
-    """An object: vertices (v, 3), canonical; faces (f, 3), cleaned (`nrdf.geometry.mesh.clean`);
-    label (f,) name of each face's part; checksum: SHA-256 of its file."""
+    """An object: vertices (v, 3), canonical; faces (f, 3), cleaned by
+    `nrdf.geometry.mesh.clean_mesh`; label (f,) name of each face's part; checksum: SHA-256 of its
+    file."""
 
     listed: Listed
     vertices: np.ndarray
@@ -199,8 +200,8 @@ def _load(arrays: Arrays, name: str, columns: int, kinds: str) -> np.ndarray:
         raise ValueError(f"it has no array '{name}', only: {', '.join(arrays.names)}")
     shape, kind = arrays.head(name)
     wanted = shape[:1] if columns == 1 else (*shape[:1], columns)
-    if not shape or shape != wanted or kind.kind not in kinds or shape[0] > MOST_FACES:
+    if not shape or shape != wanted or kind.kind not in kinds or shape[0] > MAX_FACES:
         raise ValueError(
-            f"'{name}' is {shape} of {kind}; expected at most {MOST_FACES} rows of {columns}"
+            f"'{name}' is {shape} of {kind}; expected at most {MAX_FACES} rows of {columns}"
         )
     return arrays.load(name)

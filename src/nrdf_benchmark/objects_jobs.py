@@ -20,8 +20,8 @@ from trimesh.exchange.ply import export_ply
 
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.export.registry import export_job
+from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud, read_cloud
-from nrdf.io.ply import write_atomically
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 from nrdf.process.transfer import MIN_CONFIDENCE
 from nrdf_benchmark.methods import METHODS
 from nrdf_benchmark.objects_jobs import JobFigure, jobs_lines

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.geometry.mesh import outer_skin
-from nrdf.geometry.points import estimate_normals
+from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.simulate import ScanSettings, simulate_scan

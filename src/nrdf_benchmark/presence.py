@@ -17,9 +17,8 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.optimize import minimize
 
 from nrdf.errors import DataError
+from nrdf.io.atomic import output_errors, write_atomically
 from nrdf.io.files import read_file
-from nrdf.io.locks import writing
-from nrdf.io.ply import write_atomically
 from nrdf.process.transfer import MIN_CONFIDENCE
 from nrdf.regions.presence import SURELY_ABSENT, Evidence
 from nrdf.scans.pose_scorer import PoseScorer
@@ -123,7 +122,7 @@ def kept(folder: Path, name: str, collect: Callable[[], list[Example]]) -> list[
     """
     path = folder / f"{name}.json"
     if not path.is_file():
-        with writing(folder):
+        with output_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
         write_atomically(path, [json.dumps([asdict(e) for e in collect()]).encode()])
     try:

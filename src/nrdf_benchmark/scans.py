@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import DataError
-from nrdf.geometry.mesh import load_mesh, outer_skin
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.regions.match import Match
 from nrdf.regions.presence import ABSENT
 from nrdf.regions.reference import EncodedReference

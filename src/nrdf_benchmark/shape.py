@@ -19,9 +19,9 @@ import torch
 import nrdf
 from nrdf.errors import ConfigError, DataError, NrdfError, OutputError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud
-from nrdf.io.names import spreadsheet_text
-from nrdf.io.ply import write_atomically
+from nrdf.io.file_names import spreadsheet_text
 from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
 from nrdf.shapes.pool import CRASHED, each

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from nrdf.errors import OutputError
+from nrdf.io.atomic import output_errors, write_atomically
 from nrdf.io.files import read_file
-from nrdf.io.locks import remove_parts, writing
-from nrdf.io.ply import write_atomically
+from nrdf.io.locks import remove_partial_files
 from nrdf_benchmark import metrics
 from nrdf_benchmark.bsrc import Benchmark, BenchmarkObject
 from nrdf_benchmark.methods import MethodSpec
@@ -62,7 +62,7 @@ class LineStore:
         self.folder, self.overwrite = folder / FOLDER, overwrite
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            remove_parts(self.folder)
+            remove_partial_files(self.folder)
         except OSError as error:
             raise OutputError(
                 f"cannot make {self.folder}: {error.strerror or error}; choose another --out"
@@ -89,7 +89,7 @@ class LineStore:
     def append(self, name: str, mark: str, content: Mapping[str, Any]) -> None:
         """Add a line."""
         path = self.folder / name
-        with writing(path), open(path, "a", encoding="utf-8") as file:
+        with output_errors(path), open(path, "a", encoding="utf-8") as file:
             file.write(json.dumps({"fingerprint": mark, **content}) + "\n")
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.io.names import spreadsheet_text
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
+from nrdf.io.file_names import spreadsheet_text
 from nrdf_benchmark import metrics
 from nrdf_benchmark.baselines import SEED
 from nrdf_benchmark.bsrc import CORRECTIONS, Benchmark

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.member import Member
 from nrdf.surface.border import OWN

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from nrdf.io.output import output_folder
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 
 EVENTS = ("os.rename", "os.remove", "os.rmdir", "os.mkdir")
 FOREIGN = {"mine.txt": "mine", "sub/note.txt": "mine", "other/deep/x.txt": "mine"}

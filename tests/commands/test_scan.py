@@ -14,7 +14,7 @@ from nrdf import cli
 from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.io.ply import read_header, read_scalars
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 from nrdf.shapes.families import get_family
 
 SEED = 1_000_003

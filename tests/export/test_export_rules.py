@@ -18,7 +18,7 @@ from nrdf.export.names import identifier, number, plain_text
 from nrdf.export.options import Options
 from nrdf.export.prepare import strokes
 from nrdf.export.registry import FORMATS, export_job
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 from nrdf.toolpath.file import write_toolpaths
 from nrdf.toolpath.types import Job, Segment, ToolPath
 

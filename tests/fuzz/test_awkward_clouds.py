@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from builders.fuzzing import outcome_of, tries
 from nrdf.errors import CloudError
-from nrdf.geometry.mesh import FARTHEST
+from nrdf.geometry.mesh import MAX_COORDINATE
 from nrdf.io.cloud import PointCloud, check_cloud, read_cloud, write_cloud
 from nrdf.io.inputs import as_cloud
 
@@ -100,10 +100,10 @@ def test_awkward_clouds_are_read_as_they_are_or_refused(folder, points, name):
     outcome = read(folder, name, points)
     finite = np.isfinite(points).all(axis=1)
     if isinstance(outcome, CloudError):
-        beyond = bool((np.abs(points[finite]) > FARTHEST).any())
+        beyond = bool((np.abs(points[finite]) > MAX_COORDINATE).any())
         assert len(points) == 0 or not finite.all() or beyond, outcome
     else:
-        assert finite.any() and np.abs(outcome.points).max() <= FARTHEST
+        assert finite.any() and np.abs(outcome.points).max() <= MAX_COORDINATE
         np.testing.assert_allclose(outcome.points, points[finite], rtol=1e-15, atol=0)
         outcome_of(lambda: check_cloud(outcome, 3))
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from builders.fuzzing import damaged, outcome_of, tries
 from builders.valid_files import CLOUDS, MESHES
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.mesh import load_mesh
 from nrdf.io.cloud import PointCloud, read_cloud
+from nrdf.io.formats.mesh_file import load_mesh
 
 
 @pytest.fixture

@@ -7,15 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nrdf.errors import CloudError
-from nrdf.geometry.points import (
-    bounding_box,
-    canonical_transform,
-    estimate_normals,
-    fibonacci_directions,
-    seen_through,
-    thin,
-    visibility,
-)
+from nrdf.geometry.canonical import bounding_box, canonical_transform
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample, fibonacci_directions
+from nrdf.geometry.visibility import seen_from_both_sides, visibility
 from nrdf.scans.simulate import ScanSettings, simulate_scan
 
 
@@ -82,7 +77,7 @@ def test_directions_are_unit_and_even():
 )
 def test_thinning_keeps_as_many_points_as_asked(count):
     points, _ = sphere(np.random.default_rng(0), 20_000)
-    index = thin(points, count, np.random.default_rng(1))
+    index = downsample(points, count, np.random.default_rng(1))
     assert len(index) == min(count, 20_000) == len(set(index))
     assert (np.diff(index) > 0).all()
 
@@ -91,22 +86,22 @@ def test_thinning_evens_out_the_density():
     rng = np.random.default_rng(0)
     points, _ = sphere(rng, 60_000)
     dense_above = points[(points[:, 1] > 0) | (rng.random(60_000) < 0.03)]
-    above = dense_above[thin(dense_above, 400, rng), 1] > 0
+    above = dense_above[downsample(dense_above, 400, rng), 1] > 0
     assert (dense_above[:, 1] > 0).mean() > 0.95
     assert 0.4 < above.mean() < 0.65
 
 
 def test_thinning_copes_with_coincident_points():
     points = np.repeat(np.eye(3), 50, axis=0)
-    assert len(thin(points, 10, np.random.default_rng(0))) == 10
-    assert len(thin(np.zeros((100, 3)), 10, np.random.default_rng(0))) == 10
+    assert len(downsample(points, 10, np.random.default_rng(0))) == 10
+    assert len(downsample(np.zeros((100, 3)), 10, np.random.default_rng(0))) == 10
 
 
 def test_thinning_ten_million_points_is_quick():
     points = np.random.default_rng(0).random((10_000_000, 3), dtype=np.float32)
     points[:, 1] = 0.0
     start = time.process_time()
-    index = thin(points, 8192, np.random.default_rng(1))
+    index = downsample(points, 8192, np.random.default_rng(1))
     assert time.process_time() - start < 8.0  # 2 s on an idle core
     for corner in (points[index] < 0.25, points[index] > 0.75):
         assert corner[:, [0, 2]].all(axis=1).mean() == pytest.approx(1 / 16, rel=0.2)
@@ -114,7 +109,7 @@ def test_thinning_ten_million_points_is_quick():
 
 def test_thinning_takes_points_that_fill_a_volume():
     points = np.random.default_rng(0).random((300_000, 3))
-    index = thin(points, 1000, np.random.default_rng(1))
+    index = downsample(points, 1000, np.random.default_rng(1))
     assert len(index) == 1000
     assert (points[index] < 0.5).all(axis=1).mean() == pytest.approx(1 / 8, abs=0.04)
 
@@ -196,12 +191,12 @@ def test_visibility_tells_the_outer_side_and_finds_buried_points():
 def test_both_sides_are_seen_of_an_open_surface_only():
     rng = np.random.default_rng(0)
     points, normals = box(rng, 6000, (1.0, 0.05, 0.8))
-    assert not seen_through(points, normals).any()
+    assert not seen_from_both_sides(points, normals).any()
     bowl, lines = sphere(rng, 6000)
     dish = bowl[:, 1] < -0.3
-    assert seen_through(bowl[dish], lines[dish]).mean() > 0.8
+    assert seen_from_both_sides(bowl[dish], lines[dish]).mean() > 0.8
     flask = bowl[:, 1] < 0.4  # a small hole changes nothing
-    assert not seen_through(bowl[flask], lines[flask]).any()
+    assert not seen_from_both_sides(bowl[flask], lines[flask]).any()
 
 
 def test_normals_of_a_partial_cloud_point_to_the_sensors_that_saw_it():
@@ -216,7 +211,7 @@ def test_normals_of_a_partial_cloud_point_to_the_sensors_that_saw_it():
         seen = simulate_scan(
             bench.vertices, bench.faces, ScanSettings(views=views), np.random.default_rng(1)
         )
-        chosen = thin(seen.cloud.points, 4000, np.random.default_rng(0))
+        chosen = downsample(seen.cloud.points, 4000, np.random.default_rng(0))
         away = np.array([5.0, 0.0, 0.0])
         points, true = seen.cloud.points[chosen] + away, seen.normals[chosen]
         sensors = seen.cloud.sensors + away

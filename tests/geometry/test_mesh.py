@@ -4,7 +4,8 @@ import trimesh
 
 from builders.box_chair import chair, inside_chair
 from nrdf.errors import DataError
-from nrdf.geometry.mesh import clean, load_mesh, outer_skin
+from nrdf.geometry.mesh import clean_mesh, outer_skin
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.shapes.occupancy import inside
 
 
@@ -49,7 +50,7 @@ def test_a_defective_chair_has_its_true_inside_and_normals(defect):
     rng = np.random.default_rng(0)
     mesh = chair()
     defect(mesh, rng)
-    vertices, faces = clean(np.array(mesh.vertices), np.array(mesh.faces))
+    vertices, faces = clean_mesh(np.array(mesh.vertices), np.array(mesh.faces))
     faces, skin = outer_skin(vertices, faces, 3000, rng)
     queries = rng.uniform(-0.6, 0.6, (20_000, 3))
     truth, found = inside_chair(queries), inside(vertices, faces, queries)
@@ -64,7 +65,7 @@ def test_the_skin_leaves_hidden_surfaces_out():
     outer = trimesh.creation.icosphere(3, 0.5)
     inner = trimesh.creation.icosphere(3, 0.4)
     both = trimesh.util.concatenate([outer, inner])
-    skin = outer_skin(*clean(both.vertices, both.faces), 2000, np.random.default_rng(0))[1]
+    skin = outer_skin(*clean_mesh(both.vertices, both.faces), 2000, np.random.default_rng(0))[1]
     assert len(skin.points) == 2000
     assert (np.linalg.norm(skin.points, axis=1) > 0.45).mean() > 0.99
     assert ((skin.points * skin.normals).sum(axis=1) > 0).mean() > 0.999
@@ -75,7 +76,7 @@ def test_an_open_panel_faces_the_side_it_is_seen_from():
     shell = trimesh.creation.box((1.0, 0.3, 0.5)).subdivide().subdivide().subdivide()
     shell.update_faces(shell.triangles_center[:, 1] > -0.14)
     shell.invert()
-    vertices, faces = clean(shell.vertices, shell.faces)
+    vertices, faces = clean_mesh(shell.vertices, shell.faces)
     faces, _ = outer_skin(vertices, faces, 2000, np.random.default_rng(0))
     turned = trimesh.Trimesh(vertices, faces, process=False)
     assert ((turned.face_normals * turned.triangles_center).sum(axis=1) > 0).all()
@@ -84,14 +85,14 @@ def test_an_open_panel_faces_the_side_it_is_seen_from():
 def test_cleaning_merges_and_drops():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [2, 0, 0], [9, 9, 9]], float)
     faces = np.array([[0, 1, 2], [2, 3, 0], [0, 1, 4], [0, 1, 3]])
-    merged, kept = clean(vertices, faces)
+    merged, kept = clean_mesh(vertices, faces)
     assert len(kept) == 1  # the second is the first turned over, the others have no area
     assert len(merged) == 4
 
 
 def test_cleaning_a_mesh_without_area_says_so():
     with pytest.raises(DataError, match="no face has an area"):
-        clean(np.zeros((3, 3)), np.array([[0, 1, 2]]))
+        clean_mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]))
 
 
 @pytest.mark.parametrize(

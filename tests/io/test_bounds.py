@@ -10,7 +10,7 @@ import pytest
 
 from nrdf import cli
 from nrdf.errors import ConfigError
-from nrdf.io.bounds import FINITE, SHARE, Count, Seed, Share, Within, check_numbers
+from nrdf.io.bounds import FINITE, FRACTION, Bounds, Count, Fraction, Seed, check_numbers
 from nrdf.process.limits import Limits
 
 NAN, INF = float("nan"), float("inf")
@@ -90,10 +90,10 @@ def test_limits_in_python_are_checked_too():
     ("bounds", "good", "bad", "words"),
     [
         (FINITE, (-1e300, 0, 10**400), (NAN, INF), "a finite number"),
-        (SHARE, (0, 0.5, 1), (-1e-9, 1.1, NAN), "from 0 to 1"),
-        (Within(0.0), (0, 5), (-1, INF), "0 or more"),
-        (Within(0.0, above=True), (1e-9,), (0, -(10**400)), "above 0"),
-        (Within(0.0, 2.0, above=True), (2,), (0, 3), "above 0 to 2"),
+        (FRACTION, (0, 0.5, 1), (-1e-9, 1.1, NAN), "from 0 to 1"),
+        (Bounds(0.0), (0, 5), (-1, INF), "0 or more"),
+        (Bounds(0.0, above=True), (1e-9,), (0, -(10**400)), "above 0"),
+        (Bounds(0.0, 2.0, above=True), (2,), (0, 3), "above 0 to 2"),
     ],
 )
 def test_bounds(bounds, good, bad, words):
@@ -105,7 +105,7 @@ def test_bounds(bounds, good, bad, words):
 
 
 def test_bounds_are_found_within_annotations():
-    hints = {"share": Share | None, "pair": tuple[Annotated[float, Within(0.0)], float]}
+    hints = {"share": Fraction | None, "pair": tuple[Annotated[float, Bounds(0.0)], float]}
     check_numbers({"share": None, "pair": (1.0, 2.0), "flag": True, "name": "nan"}, hints)
     for wrong in ({"share": 2.0}, {"pair": (1.0, -1.0)}, {"unknown": NAN}, {"unknown": -1}):
         with pytest.raises(ConfigError):

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from nrdf.errors import OutputError
-from nrdf.io.output import check_inputs, output_file, output_folder, write_json
-from nrdf.io.swap import MANIFEST
+from nrdf.io.atomic import write_json
+from nrdf.io.output import check_inputs, output_file, output_folder
+from nrdf.io.result_folder import MANIFEST
 
 
 def test_folder_appears_only_when_the_block_ends_well(tmp_path):

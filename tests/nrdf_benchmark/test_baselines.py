@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from builders.bsrc_folder import NO_DEV_HALF, dev_half, member_clouds
-from nrdf.geometry.points import fibonacci_directions
+from nrdf.geometry.sampling import fibonacci_directions
 from nrdf.io.cloud import PointCloud
 from nrdf_benchmark import baselines as module
 from nrdf_benchmark.baselines import Copied, Registered, hidden_point_normals

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 import nrdf
 from builders.taught_box import SAND, SIZE, cloud, faces, lesson
 from nrdf.errors import CloudError, ModelError
+from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import Mesh
-from nrdf.geometry.points import canonical_transform
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import write_knowledge

@@ -10,7 +10,7 @@ import pytest
 
 from builders.scenes import UP, pose, scan_of
 from builders.solids import box
-from nrdf.geometry.mesh import clean, outer_skin
+from nrdf.geometry.mesh import clean_mesh, outer_skin
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.clean import clean_scan
 from nrdf.scans.objects import count_objects, separate_objects
@@ -94,7 +94,7 @@ def test_real_chairs_are_one_and_pairs_of_them_two():
     clouds = []
     for file in files:
         with np.load(file) as content:
-            mesh = clean(content["vertices"].astype(float), content["faces"].astype(int))
+            mesh = clean_mesh(content["vertices"].astype(float), content["faces"].astype(int))
         clouds.append(outer_skin(*mesh, 8192, np.random.default_rng(0))[1].points)
     for one, other in zip(clouds, clouds[1:] + clouds[:1], strict=True):
         assert count_objects(PointCloud(turned(one)[0])) == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 from nrdf.shapes.pool import CRASHED, each
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from builders.solids import box
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
 from nrdf.shapes.families import get_family
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 

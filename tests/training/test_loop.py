@@ -18,7 +18,7 @@ from builders.tiny_field import Ball, TinyField, balls, tiny_config, write_folde
 from nrdf.errors import ConfigError, DataError, OutputError, TrainingError
 from nrdf.field import PRESETS
 from nrdf.field.weights import load_weights
-from nrdf.io.locks import claim
+from nrdf.io.locks import write_lock
 from nrdf.training import loop
 from nrdf.training.checkpoint import latest_checkpoint
 from nrdf.training.loop import learning_rate, train
@@ -78,7 +78,7 @@ def test_training_learns_and_says_what_it_made(data, tmp_path):
 
 def test_a_second_training_in_the_same_folder_is_refused(data, tmp_path):
     with (
-        claim(tmp_path / "run"),
+        write_lock(tmp_path / "run"),
         pytest.raises(OutputError, match=r"another run is writing to .*run"),
     ):
         run(data, tmp_path / "run")

@@ -16,7 +16,7 @@ from nrdf.field.weights import load_tensors
 from nrdf.field.yaw import YawNetwork, at_yaws, load_yaw, turn
 from nrdf.field.zoo import add_to_zoo, list_models
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, about_up
-from nrdf.io.locks import claim
+from nrdf.io.locks import write_lock
 from nrdf.shapes.dataset import IndexRow, write_index, write_shape
 from nrdf.training import small
 from nrdf.training.provenance import Entry, list_shapes
@@ -133,7 +133,7 @@ def test_training_goes_on_where_it_was_killed(folder, tmp_path, monkeypatch):
 
 
 def test_a_second_training_in_the_same_folder_is_refused(folder, tmp_path):
-    with claim(tmp_path / "run"), pytest.raises(OutputError, match="another run is writing"):
+    with write_lock(tmp_path / "run"), pytest.raises(OutputError, match="another run is writing"):
         train_yaw("step", [folder], tmp_path / "run", FEW)
     assert list(tmp_path.iterdir()) == []
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from nrdf.errors import OutputError
-from nrdf.geometry.points import fibonacci_directions
+from nrdf.geometry.sampling import fibonacci_directions
 from nrdf.viz.picture import Panel, draw_regions, region_colours, render_details, render_panels
 
 BALL = fibonacci_directions(4000)

@@ -108,7 +108,8 @@ def write_report(folder: Path, report: dict[str, Any]) -> None:
     """Write report.json, with the time and the list of all files beside it."""
     from datetime import datetime, timezone
 
-    from nrdf.io.output import REPORT, write_json
+    from nrdf.io.atomic import write_json
+    from nrdf.io.result_folder import REPORT
 
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     date = datetime.now(timezone.utc).isoformat(timespec="seconds")

@@ -109,9 +109,9 @@ def zoo(
         note: One line about this model.
     """
     from nrdf.field.zoo import ZOO, add_to_zoo
-    from nrdf.io.locks import claim
+    from nrdf.io.locks import write_lock
 
-    with claim(ZOO):
+    with write_lock(ZOO):
         entry = add_to_zoo(weights, name, _parse_scores(scores), note)
     console.print(f"'{entry.name}' is in the zoo: {entry.file}, {entry.bytes / 1e6:.2f} MB")
 

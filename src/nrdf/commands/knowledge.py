@@ -133,7 +133,8 @@ def schema(out: Path | None = None) -> None:
     """
     import json
 
-    from nrdf.io.output import output_file, write_json
+    from nrdf.io.atomic import write_json
+    from nrdf.io.output import output_file
     from nrdf.process.knowledge import Knowledge
 
     content = {

@@ -17,7 +17,7 @@ def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Ar
     """A decorator: where the argument `name` gives a place, or several, no other run writes there.
 
     A second one is refused at once, before anything is computed, and so is a place that cannot be
-    written (`nrdf.io.locks.claim`).
+    written (`nrdf.io.locks.write_lock`).
     """
 
     def decorate(verb: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -25,7 +25,7 @@ def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Ar
 
         @wraps(verb)
         def alone(*values: Arguments.args, **named: Arguments.kwargs) -> Result:
-            from nrdf.io.locks import claim
+            from nrdf.io.locks import write_lock
 
             bound = signature.bind(*values, **named)
             bound.apply_defaults()
@@ -33,7 +33,7 @@ def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Ar
             places = {given} if isinstance(given, (str, Path)) else set(given or ())
             with ExitStack() as stack:
                 for place in sorted(places):
-                    stack.enter_context(claim(place))
+                    stack.enter_context(write_lock(place))
                 return verb(*values, **named)
 
         return alone

@@ -8,18 +8,18 @@ from typing import Annotated, Literal
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console
-from nrdf.io.bounds import NotNegative, Positive, Seed, Within
+from nrdf.io.bounds import Bounds, NonNegative, Positive, Seed
 
 
 def scan(
     mesh: Positional[Path],
     out: Path,
-    views: Annotated[int, Within(1, 1000)] = 3,
-    noise: NotNegative = 0.0,
-    quantisation: NotNegative = 0.0,
-    grazing: Annotated[float, Within(0.0, 90.0)] = 15.0,
+    views: Annotated[int, Bounds(1, 1000)] = 3,
+    noise: NonNegative = 0.0,
+    quantisation: NonNegative = 0.0,
+    grazing: Annotated[float, Bounds(0.0, 90.0)] = 15.0,
     distance: Positive = 2.0,
-    pixels: Annotated[int, Within(1, 4096)] = 240,
+    pixels: Annotated[int, Bounds(1, 4096)] = 240,
     floor: bool = False,
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z",
     yaw: float | None = None,
@@ -60,10 +60,11 @@ def scan(
     import numpy as np
 
     from nrdf.errors import DataError
-    from nrdf.geometry.mesh import load_mesh
     from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+    from nrdf.io.atomic import write_json
     from nrdf.io.cloud import write_cloud
-    from nrdf.io.output import output_files, write_json
+    from nrdf.io.formats.mesh_file import load_mesh
+    from nrdf.io.output import output_files
     from nrdf.scans.simulate import ScanSettings, simulate_scan
 
     beside = out.with_suffix(".json")

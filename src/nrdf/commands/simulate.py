@@ -8,7 +8,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, errors, progress_bar, show, table, versions
-from nrdf.io.bounds import FINITE, Count, NotNegative, Seed
+from nrdf.io.bounds import FINITE, Count, NonNegative, Seed
 
 
 def simulate(
@@ -17,7 +17,7 @@ def simulate(
     robot: Path | None = None,
     tool_frame: str | None = None,
     base: tuple[str, ...] = ("auto",),
-    stand: NotNegative = 0.0,
+    stand: NonNegative = 0.0,
     turns: Count | None = None,
     mesh: Path | None = None,
     up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None,

@@ -8,14 +8,14 @@ from typing import Annotated
 
 from nrdf.commands.console import command_line, console, errors, versions
 from nrdf.commands.one_run import one_run_at
-from nrdf.io.bounds import Within
+from nrdf.io.bounds import Bounds
 
 
 @one_run_at("session")
 def studio(
     session: Path = Path("studio"),
     host: str = "127.0.0.1",
-    port: Annotated[int, Within(1, 65535)] = 8080,
+    port: Annotated[int, Bounds(1, 65535)] = 8080,
     no_browser: bool = False,
     device: str = "cpu",
     robot: Path | None = None,

@@ -10,7 +10,7 @@ from tyro.conf import Positional
 
 from nrdf.commands.align import Skip, Unit, describe_alignment, read_scan, stand_ins
 from nrdf.commands.console import command_line, console, errors, provenance, show, table, versions
-from nrdf.io.bounds import NotNegative, Share, Within
+from nrdf.io.bounds import Bounds, Fraction, NonNegative
 
 _NAME_WIDTH = 12  # characters
 
@@ -31,14 +31,14 @@ def transfer(
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
     region: tuple[Path, ...] = (),
-    min_confidence: Share | None = None,
-    min_coverage: Share | None = None,
-    max_line_spacing_mm: NotNegative | None = None,
-    max_surface_distance_mm: NotNegative | None = None,
-    max_axis_error_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
-    max_step_mm: NotNegative | None = None,
-    max_turn_deg: Annotated[float, Within(0.0, 180.0)] | None = None,
-    max_cycle_time_s: NotNegative | None = None,
+    min_confidence: Fraction | None = None,
+    min_coverage: Fraction | None = None,
+    max_line_spacing_mm: NonNegative | None = None,
+    max_surface_distance_mm: NonNegative | None = None,
+    max_axis_error_deg: Annotated[float, Bounds(0.0, 180.0)] | None = None,
+    max_step_mm: NonNegative | None = None,
+    max_turn_deg: Annotated[float, Bounds(0.0, 180.0)] | None = None,
+    max_cycle_time_s: NonNegative | None = None,
     require_all: bool = False,
     any_kind: bool = False,
     strict: bool = False,

@@ -9,7 +9,7 @@ from pathlib import Path
 from nrdf.export.names import numbers, plain_text
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.prepare import tool_numbers
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 from nrdf.toolpath.types import Job, Segment, ToolPath
 
 TOOL_Z_WORDS = {

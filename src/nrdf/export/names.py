@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options
-from nrdf.io.names import DEVICES
+from nrdf.io.file_names import WINDOWS_DEVICES
 from nrdf.toolpath.types import Job
 
 
@@ -58,7 +58,7 @@ def program_name(job: Job, options: Options, longest: int, language: str, words:
     Raises ProcessError for a name that the language or the file system keeps for itself.
     """
     name = identifier(options.program or f"nrdf_{job.category}", longest)
-    if name.lower() in DEVICES or name.lower() in words.split():
+    if name.lower() in WINDOWS_DEVICES or name.lower() in words.split():
         raise ProcessError(
             f"--program {name}: {language} has a use of its own for this name; give another"
         )

@@ -16,7 +16,7 @@ from nrdf.export.names import identifier, plain_text
 from nrdf.export.options import Options
 from nrdf.export.plain import describe
 from nrdf.export.prepare import prepare
-from nrdf.io.locks import writing
+from nrdf.io.atomic import output_errors
 from nrdf.toolpath.types import Job, Segment
 
 BAG = "bag"
@@ -40,7 +40,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     store = get_typestore(Stores.ROS2_HUMBLE)
     frame = plain_text(job.frame).replace(" ", "_")
-    with writing(folder / BAG), Writer(folder / BAG, version=8) as writer:
+    with output_errors(folder / BAG), Writer(folder / BAG, version=8) as writer:
 
         def send(topic: str, kind: str, message: Any, nanoseconds: int) -> None:
             known = (c for c in writer.connections if c.topic == topic)

@@ -10,7 +10,7 @@ from nrdf.export.header import commented, header, save, tool_z_words
 from nrdf.export.names import plain_text, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
-from nrdf.io.names import spreadsheet_text
+from nrdf.io.file_names import spreadsheet_text
 from nrdf.toolpath.types import Job
 
 COLUMNS = (

@@ -13,7 +13,9 @@ import torch
 from nrdf.field.base import Field
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.field.kind import KindNetwork, find_kind
-from nrdf.geometry.points import canonical_transform, estimate_normals, thin
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import check_cloud
 from nrdf.io.inputs import as_cloud
@@ -76,7 +78,7 @@ class CloudEncoder:
         start = time.perf_counter()
         if pose is None:
             pose = Similarity(np.eye(3), *canonical_transform(cloud.points))
-        working = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        working = downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0))
         points = pose.to_canonical(cloud.points[working])
         seconds["normalise"] = time.perf_counter() - start
         start = time.perf_counter()

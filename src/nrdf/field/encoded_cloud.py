@@ -9,8 +9,9 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.points import seen_through, thin
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import Similarity
+from nrdf.geometry.visibility import seen_from_both_sides
 from nrdf.io.cloud import PointCloud
 
 NORMAL_WEIGHT = 0.1
@@ -76,7 +77,7 @@ class EncodedCloud:
         """
         if self.cloud.normals is not None or self.cloud.sensors is not None:
             return self
-        again = np.flatnonzero(seen_through(self.points, self.normals))
+        again = np.flatnonzero(seen_from_both_sides(self.points, self.normals))
         return replace(
             self,
             working=np.concatenate([self.working, self.working[again]]),
@@ -122,6 +123,6 @@ class EncodedCloud:
 def encoder_subset(points: np.ndarray, count: int) -> np.ndarray:
     """Indices of the points that the encoder sees: an even subset of `count`, which always holds
     the extreme points of each axis, so that the embedding knows the bounding box exactly."""
-    chosen = thin(points, count, np.random.default_rng(0))
+    chosen = downsample(points, count, np.random.default_rng(0))
     extremes = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
     return np.union1d(chosen, extremes)

@@ -17,9 +17,9 @@ from torch import Tensor, nn
 from nrdf.errors import ModelError
 from nrdf.field import build_field
 from nrdf.field.base import Field
+from nrdf.io.atomic import write_atomically
 from nrdf.io.files import require_file
-from nrdf.io.ply import write_atomically
-from nrdf.io.schema import explain
+from nrdf.io.schema import validation_messages
 
 FORMAT = "nrdf-weights-1"
 LARGEST = 500_000_000
@@ -151,7 +151,7 @@ def load_tensors(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         metadata = {key: json.loads(value) for key, value in text.items()}
         _Metadata.model_validate(metadata)
     except ValidationError as error:
-        why = "; ".join(explain(error, _Metadata))
+        why = "; ".join(validation_messages(error, _Metadata))
         raise ModelError(f"{path} does not say what it is: {why}; get it again") from None
     except (ValueError, RecursionError) as error:
         raise ModelError(f"{path} does not say what it is ({error}); get it again") from None

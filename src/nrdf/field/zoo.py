@@ -19,9 +19,9 @@ from pydantic import ConfigDict, TypeAdapter
 from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
 from nrdf.field.weights import load_weights, read_metadata
+from nrdf.io.atomic import write_atomically
+from nrdf.io.file_names import file_name_problem
 from nrdf.io.files import read_file
-from nrdf.io.names import file_name_fault
-from nrdf.io.ply import write_atomically
 
 log = logging.getLogger(__name__)
 
@@ -146,7 +146,7 @@ def add_to_zoo(
     if metadata["preset"] in (YAW, KIND):
         zoo = zoo / metadata["preset"]
     name = name or str(metadata["category"])
-    fault = file_name_fault(name) or (
+    fault = file_name_problem(name) or (
         ""
         if name.isprintable() and name == Path(name).name
         else "it may have no separators, because it becomes a file name"

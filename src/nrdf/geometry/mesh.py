@@ -6,28 +6,22 @@ that overlap, and insides (cabins, double shells) that no sensor ever sees.
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from nrdf.errors import DataError, NrdfError
-from nrdf.geometry.points import visibility
-from nrdf.io.files import open_file, read_file
+from nrdf.errors import DataError
+from nrdf.geometry.visibility import visibility
 
-MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
-MOST_FACES = 1_800_000
-FARTHEST = 1e12
+MAX_FACES = 1_800_000
+MAX_COORDINATE = 1e12
 """The largest coordinate that is read, in any unit; beyond it are damaged files only, and numbers
 that cannot be squared."""
 SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
 _HASH = np.uint64(0x9E3779B97F4A7C15)  # odd, with evenly spread bits
 _PART = 1 << 17  # faces
-_MOST_BESIDE = 250_000_000  # bytes of a file that a mesh names
 _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
 
 
@@ -53,61 +47,12 @@ class Skin:
     face: np.ndarray
 
 
-def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (v, 3) float64, in the file's unit, and faces (f, 3) int64 of the mesh `path`.
-
-    PLY, OBJ, OFF, STL, GLB, glTF, 3MF or DAE; a scene's meshes are put together. Equal vertices are
-    merged, faces without area and repeated faces left out. Raises DataError if the file cannot be
-    read, claims more than it holds, or holds no surface, vertices that are not finite or beyond
-    all sizes, or too many faces.
-    """
-    import trimesh
-
-    from nrdf.io.formats.mesh_claims import check_claims
-
-    path = Path(path)
-    logging.getLogger("trimesh").setLevel(logging.ERROR)
-    if path.suffix.lower() not in MESH_ENDINGS:
-        raise DataError(f"{path}: no mesh that can be read; known: {', '.join(MESH_ENDINGS)}")
-    with open_file(path, DataError) as file:
-        try:
-            check_claims(path, file)
-            file.seek(0)
-            if file.read(3) != b"\xef\xbb\xbf":  # a byte-order mark hides the first line
-                file.seek(0)
-            beside: Any = _Beside(path)
-            mesh: Any = trimesh.load(
-                file,
-                file_type=path.suffix.lower()[1:],
-                resolver=beside,
-                process=False,
-                skip_materials=True,  # and the pictures that they name
-            )
-            if isinstance(mesh, trimesh.Scene):
-                mesh = mesh.to_mesh()
-        except NrdfError as error:
-            why = str(error).removeprefix(f"{path}: ")
-            raise DataError(f"{path}: unreadable as a mesh: {why}") from error
-        except Exception as error:  # trimesh raises whatever its parsers raise
-            why = str(error) or type(error).__name__
-            raise DataError(f"{path}: unreadable as a mesh, truncated or damaged: {why}") from error
-    faces = np.asarray(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64)
-    vertices = np.asarray(getattr(mesh, "vertices", np.empty((0, 3))), dtype=np.float64)
-    del mesh
-    try:
-        vertices, faces = check_mesh(vertices, faces)
-        check_size(vertices)
-        return clean(vertices, faces)
-    except DataError as error:
-        raise DataError(f"{path}: {error}") from error
-
-
-def check_size(points: np.ndarray) -> None:
+def check_coordinate_range(points: np.ndarray) -> None:
     """Raise DataError for points (n, 3), finite, with coordinates beyond those of any object."""
-    if (largest := max(points.max(initial=0.0), -points.min(initial=0.0))) > FARTHEST:
+    if (largest := max(points.max(initial=0.0), -points.min(initial=0.0))) > MAX_COORDINATE:
         raise DataError(
-            f"has coordinates of {largest:.3g}; at most {FARTHEST:g} are read: it is damaged, or "
-            "no object"
+            f"has coordinates of {largest:.3g}; at most {MAX_COORDINATE:g} are read: it is "
+            "damaged, or no object"
         )
 
 
@@ -126,8 +71,8 @@ def check_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
         raise DataError(
             f"vertices {vertices.shape} and faces {faces.shape} must be (v, 3) and (f, 3)"
         )
-    if len(faces) > MOST_FACES:
-        raise DataError(f"{len(faces)} faces; at most {MOST_FACES} are used: simplify the mesh")
+    if len(faces) > MAX_FACES:
+        raise DataError(f"{len(faces)} faces; at most {MAX_FACES} are used: simplify the mesh")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise DataError("a face names a vertex that does not exist")
     used = np.zeros(len(vertices), bool)
@@ -138,22 +83,7 @@ def check_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
     return vertices, faces
 
 
-class _Beside:
-    """The files that a mesh names, for trimesh: those of its own folder, and regular ones only."""
-
-    def __init__(self, path: Path) -> None:
-        self._folder = path.parent.resolve()
-
-    def get(self, name: str) -> bytes:
-        place = (self._folder / name).resolve()
-        if self._folder not in place.parents:
-            raise DataError(f"it names the file {name}, which is outside its folder")
-        return read_file(place, DataError, _MOST_BESIDE)
-
-    __getitem__ = get
-
-
-def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def clean_mesh(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Merge equal vertices and drop faces without area, repeated faces and unused vertices.
 
     Without this a face that is given twice, once for each side, cancels itself: the winding number
@@ -165,7 +95,7 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def clean_faces(
     vertices: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What `clean` gives, and which of the faces (f,) are left: (k,), ascending."""
+    """What `clean_mesh` gives, and which of the faces (f,) are left: (k,), ascending."""
     # Step by step, and faces in parts: meshes of millions of faces are usual.
     used = np.zeros(len(vertices), bool)
     used[faces] = True

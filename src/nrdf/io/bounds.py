@@ -12,7 +12,7 @@ from nrdf.errors import ConfigError
 
 
 @dataclass(frozen=True)
-class Within:
+class Bounds:
     """From `least` to `most`; `above`: not `least` itself. Always finite.
 
     Stands in annotations, `Annotated[float, Within(0.0, 1.0)]`, where `check_numbers` finds it.
@@ -40,20 +40,20 @@ class Within:
         return "a finite number"
 
 
-FINITE = Within()
-SHARE = Within(0.0, 1.0)
-FROM_ZERO = Within(0.0)
+FINITE = Bounds()
+FRACTION = Bounds(0.0, 1.0)
+NON_NEGATIVE = Bounds(0.0)
 
-Share = Annotated[float, SHARE]
-NotNegative = Annotated[float, FROM_ZERO]
-Positive = Annotated[float, Within(0.0, above=True)]
-Count = Annotated[int, Within(1)]
-CountFromZero = Annotated[int, FROM_ZERO]
-Seed = Annotated[int, FROM_ZERO]
+Fraction = Annotated[float, FRACTION]
+NonNegative = Annotated[float, NON_NEGATIVE]
+Positive = Annotated[float, Bounds(0.0, above=True)]
+Count = Annotated[int, Bounds(1)]
+NonNegativeCount = Annotated[int, NON_NEGATIVE]
+Seed = Annotated[int, NON_NEGATIVE]
 
 
 def check_numbers(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
-    """Check every number among `values`, those in tuples too, by its `Within` in the annotations.
+    """Check every number among `values`, those in tuples too, by its `Bounds` in the annotations.
 
     Without one, whole numbers must be 0 or more, others finite. Raises ConfigError, with name and
     value, for the first that is not.
@@ -62,11 +62,11 @@ def check_numbers(values: Mapping[str, Any], hints: Mapping[str, Any]) -> None:
         bounds = next(_bounds_in(hints.get(name)), None)
         for number in value if isinstance(value, tuple) else (value,):
             if isinstance(number, (int, float)) and not isinstance(number, bool):
-                usual = FROM_ZERO if isinstance(number, int) else FINITE
+                usual = NON_NEGATIVE if isinstance(number, int) else FINITE
                 (bounds or usual).check(name, number)
 
 
-def _bounds_in(hint: Any) -> Iterator[Within]:
-    yield from (m for m in getattr(hint, "__metadata__", ()) if isinstance(m, Within))
+def _bounds_in(hint: Any) -> Iterator[Bounds]:
+    yield from (m for m in getattr(hint, "__metadata__", ()) if isinstance(m, Bounds))
     for inner in typing.get_args(hint):
         yield from _bounds_in(inner)

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.mesh import FARTHEST, Mesh, check_size
+from nrdf.geometry.mesh import MAX_COORDINATE, Mesh, check_coordinate_range
 from nrdf.geometry.units import METRES
 from nrdf.io import ply
 from nrdf.io.files import open_file
-from nrdf.io.formats import reader_of
+from nrdf.io.formats.detect import detect_reader
 
 logger = logging.getLogger(__name__)
 
@@ -66,10 +66,11 @@ class PointCloud:
             if sensors.size and (sensors.ndim != 2 or sensors.shape[1] != 3):
                 raise CloudError(f"sensors must have the shape (s, 3), not {sensors.shape}")
             sensors = sensors.reshape(-1, 3)
-            if not (np.abs(sensors) <= FARTHEST).all():
+            wrong = sensors[~(np.abs(sensors) <= MAX_COORDINATE)]
+            if len(wrong):
                 raise CloudError(
-                    f"a sensor's place is {sensors[~(np.abs(sensors) <= FARTHEST)][0]:.3g} along "
-                    f"an axis; give numbers up to {FARTHEST:g}, or leave out what is not known"
+                    f"a sensor's place is {wrong[0]:.3g} along an axis; give numbers up to "
+                    f"{MAX_COORDINATE:g}, or leave out what is not known"
                 )
             object.__setattr__(self, "sensors", sensors if len(sensors) else None)
 
@@ -113,7 +114,7 @@ def read_cloud(
         if not start:
             raise CloudError(f"{path}: the file is empty")
     try:
-        raw = reader_of(path, start, topic)(path, mesh_samples)
+        raw = detect_reader(path, start, topic)(path, mesh_samples)
     except OSError as error:
         raise CloudError(f"cannot read {path}: {error.strerror or error}") from error
     values = vars(raw)
@@ -144,7 +145,7 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
         logger.log(level, "%s: dropped %d points with NaN or infinite coordinates", path, missing)
         cloud = cloud.select(finite)
     try:
-        check_size(cloud.points)
+        check_coordinate_range(cloud.points)
     except DataError as error:
         raise CloudError(f"{path}: {error}") from error
     return unit_normals(str(path), cloud)
@@ -194,7 +195,7 @@ def check_coordinates(cloud: PointCloud) -> None:
     if not np.isfinite(cloud.points).all():
         raise CloudError("the cloud has NaN or infinite coordinates; remove those points")
     try:
-        check_size(cloud.points)
+        check_coordinate_range(cloud.points)
     except DataError as error:
         raise CloudError(f"the cloud {error}") from error
     if not len(cloud):
@@ -275,4 +276,4 @@ def write_cloud(
     comments += [f"frame {cloud.frame}"] if cloud.frame else []
     if cloud.sensors is not None:
         comments += ["sensor " + " ".join(f"{v:.9g}" for v in place) for place in cloud.sensors]
-    ply.write_rows(Path(path), columns, comments)
+    ply.write_ply(Path(path), columns, comments)

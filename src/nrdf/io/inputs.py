@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.mesh import check_mesh, check_size, clean
+from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh
 from nrdf.geometry.units import unit_named
 from nrdf.io.cloud import PointCloud, read_cloud, unit_normals
 from nrdf.io.formats.meshes import sample_mesh
@@ -64,8 +64,8 @@ def _sampled(mesh: Any, faces: Any, name: str, samples: int) -> PointCloud:
         if triangles.dtype.kind not in "iu" and triangles.size:
             raise DataError(f"faces must be whole numbers, not {triangles.dtype}")
         corners, triangles = check_mesh(corners, triangles)
-        check_size(corners)
-        corners, triangles = clean(corners, triangles)
+        check_coordinate_range(corners)
+        corners, triangles = clean_mesh(corners, triangles)
         raw = sample_mesh(corners, triangles, samples) if samples else RawCloud(corners)
     except (DataError, TypeError, ValueError) as error:
         raise CloudError(f"{name}: its mesh cannot be used: {error}") from error

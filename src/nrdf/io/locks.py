@@ -14,31 +14,22 @@ import os
 import re
 import secrets
 import shutil
-import sqlite3
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from nrdf.errors import OutputError
+from nrdf.io.atomic import cannot_write, output_errors
 
 log = logging.getLogger(__name__)
 
 _TOKEN = "[0-9a-f]{8}"
 _PART = re.compile(rf"\.(.+)\.{_TOKEN}\.part")
-_ADVICE = {
-    errno.ENOSPC: "free some space or choose another place",
-    errno.EDQUOT: "free some space or choose another place",
-    errno.EFBIG: "choose a place that takes larger files",
-    errno.ENAMETOOLONG: "choose a shorter name",
-    errno.EACCES: "allow writing there or choose another place",
-    errno.EPERM: "allow writing there or choose another place",
-    errno.EROFS: "it can only be read there: choose another place",
-}
 
 
 @contextmanager
-def claim(path: str | Path, wait: bool = False) -> Iterator[None]:
+def write_lock(path: str | Path, wait: bool = False) -> Iterator[None]:
     """No other run writes to `path`, a file or folder or neither yet, until the block ends.
 
     Makes the parents that are missing (those that are still empty at the end go again), and
@@ -51,7 +42,7 @@ def claim(path: str | Path, wait: bool = False) -> Iterator[None]:
     file, made = beside(place, "lock"), _missing(home(place))
     lock = FileLock(file)
     try:
-        with writing(path):
+        with output_errors(path):
             file.parent.mkdir(parents=True, exist_ok=True)
             try:
                 lock.acquire(timeout=0)
@@ -73,23 +64,6 @@ def claim(path: str | Path, wait: bool = False) -> Iterator[None]:
                 os.unlink(file)
             lock.release()
         _remove_empty(made)
-
-
-@contextmanager
-def writing(path: str | Path) -> Iterator[None]:
-    """What prevents writing `path` inside of the block is raised as OutputError."""
-    try:
-        yield
-    except (OSError, sqlite3.Error) as error:
-        raise cannot_write(path, error) from error
-
-
-def cannot_write(path: str | Path, error: Exception) -> OutputError:
-    """The OutputError that says why `path` cannot be written, and what to do."""
-    code = getattr(error, "errno", None)
-    reason = getattr(error, "strerror", None) or str(error)
-    advice = _ADVICE.get(code or 0, "choose another place, or free some space")
-    return OutputError(f"cannot write {path}: {reason}; {advice}")
 
 
 def resolved(path: str | Path) -> Path:
@@ -136,12 +110,12 @@ def _clear(place: Path) -> None:
     aside (`.old`) holds other people's files, and stays."""
     for folder in leftovers(place, "tmp"):
         shutil.rmtree(folder, ignore_errors=True)
-    remove_parts(home(place), place.name)
+    remove_partial_files(home(place), place.name)
     if place.is_dir():
-        remove_parts(place)
+        remove_partial_files(place)
 
 
-def remove_parts(folder: Path, name: str | None = None) -> None:
+def remove_partial_files(folder: Path, name: str | None = None) -> None:
     """Remove the files in `folder`, those of one `name` or all, that killed runs left half-written.
 
     Those of a name that is locked may be another run's, and stay.

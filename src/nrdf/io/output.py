@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from nrdf.errors import OutputError
-from nrdf.io.locks import beside, claim, new_token, resolved, writing
-from nrdf.io.ply import write_atomically
-from nrdf.io.swap import REPORT, replace_folder, restore, write_manifest
+from nrdf.io.atomic import output_errors
+from nrdf.io.locks import beside, new_token, resolved, write_lock
+from nrdf.io.result_folder import REPORT, replace_folder, restore_folder, write_manifest
 
 log = logging.getLogger(__name__)
 
-__all__ = ["REPORT", "check_inputs", "output_file", "output_files", "output_folder", "write_json"]
+__all__ = ["REPORT", "check_inputs", "output_file", "output_files", "output_folder"]
 
 
 @contextmanager
@@ -29,8 +27,8 @@ def output_folder(
 
     Whatever ends the block early (an error, Ctrl-C), nothing stays behind, not even the parents
     that had to be made; after `kill -9` the next run with the same `path` clears what stayed. With
-    `overwrite` an existing folder keeps what is not ours (`nrdf.io.swap`). `inputs`: files and
-    folders that are read, see `check_inputs`. A `path` that is a link is followed.
+    `overwrite` an existing folder keeps what is not ours (`nrdf.io.result_folder`). `inputs`: files
+    and folders that are read, see `check_inputs`. A `path` that is a link is followed.
 
     Raises OutputError if `path` is a file, is a folder that is not empty (without `overwrite`),
     holds one of the inputs, is being written by another run, or cannot be written.
@@ -40,11 +38,11 @@ def output_folder(
         log.info("%s is a link: the results go to %s", path, place)
     check_inputs(path, inputs)
     _check(path, overwrite=True)
-    with claim(path):
+    with write_lock(path):
         temporary = beside(place, f"{token}.tmp")
         try:
-            with writing(path):
-                restore(place)
+            with output_errors(path):
+                restore_folder(place)
                 _check(path, overwrite)
                 temporary.mkdir()
                 yield temporary
@@ -53,7 +51,7 @@ def output_folder(
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
             with suppress(OSError):  # else the next run does it
-                restore(place)
+                restore_folder(place)
 
 
 @contextmanager
@@ -73,7 +71,7 @@ def output_file(
     if Path(path).is_dir():
         raise OutputError(f"{path} is a folder; give the name of a file")
     check_inputs(path, inputs)
-    with claim(path):
+    with write_lock(path):
         yield
 
 
@@ -90,7 +88,7 @@ def output_files(
     with output_file(first, inputs), output_file(second, inputs):
         temporary = beside(resolved(first), f"{new_token()}.tmp")
         try:
-            with writing(first):
+            with output_errors(first):
                 temporary.mkdir()
                 yield temporary
                 second.unlink(missing_ok=True)
@@ -121,22 +119,6 @@ def check_inputs(path: str | Path, inputs: Iterable[str | Path | None]) -> None:
                         f"{given} is read, and would be overwritten or lie among the results in "
                         f"{path}: give another --out"
                     )
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Write JSON that a person can read, whole or not at all; non-ASCII characters as they are.
-
-    Raises OutputError if it cannot be written.
-    """
-    text = json.dumps(content, indent=2, ensure_ascii=False, default=_plain)
-    write_atomically(path, [f"{text}\n".encode("utf-8", "surrogateescape")])
-
-
-def _plain(value: Any) -> Any:
-    """NumPy numbers and arrays, paths and the like for JSON."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    return str(value)
 
 
 def _check(path: str | Path, overwrite: bool) -> None:

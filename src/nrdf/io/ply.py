@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import os
 import re
-import secrets
-from collections.abc import Container, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from nrdf.errors import CloudError
+from nrdf.io.atomic import write_atomically
 from nrdf.io.files import open_file
-from nrdf.io.locks import cannot_write
+from nrdf.io.rows import MAX_POINTS, binary_parts, count_rows, gather, text_parts
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -31,8 +29,6 @@ _TYPES = {
 _FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _COUNT = re.compile("[0-9]{1,100}")
 _LONGEST_HEADER = 1 << 16
-MOST_POINTS = 200_000_000
-_PART = 1 << 25  # bytes of binary rows, or values of text, that are held at a time
 
 
 @dataclass
@@ -85,10 +81,10 @@ def read_header(path: Path) -> Header:
         if not header.byte_order and count_rows(file, claimed) > claimed:
             raise _too_many(path, f"{claimed} rows")
     for element in header.elements:
-        if element.count > MOST_POINTS:
+        if element.count > MAX_POINTS:
             raise CloudError(
                 f"{path}: the header claims {element.count} rows of '{element.name}'; "
-                f"at most {MOST_POINTS} are read"
+                f"at most {MAX_POINTS} are read"
             )
         # An ASCII row takes at least one digit and one separator for each value.
         row = element.smallest_row if header.byte_order else 2 * len(element.properties)
@@ -103,18 +99,6 @@ def read_header(path: Path) -> Header:
     if header.byte_order and filled and not lists and left >= filled[-1].smallest_row:
         raise _too_many(path, f"{filled[-1].count} rows of '{filled[-1].name}'")
     return header
-
-
-def text_rows(file: BinaryIO) -> Iterator[bytes]:
-    """The lines of a text file that follow and are neither blank nor a comment."""
-    for line in file:
-        if not line.isspace() and not line.lstrip().startswith(b"#"):
-            yield line
-
-
-def count_rows(file: BinaryIO, most: int) -> int:
-    """How many `text_rows` follow; counts no further than one beyond `most`."""
-    return sum(1 for _ in islice(text_rows(file), most + 1))
 
 
 def _too_many(path: Path, what: str) -> CloudError:
@@ -232,54 +216,6 @@ def _read_rows(
     return values
 
 
-def binary_parts(file: BinaryIO, row: np.dtype, count: int) -> Iterator[np.ndarray]:
-    """The next `count` packed rows of a file, some at a time.
-
-    Raises EOFError where the file ends before.
-    """
-    step = max(1, _PART // row.itemsize)
-    for start in range(0, count, step):
-        part = np.fromfile(file, dtype=row, count=min(step, count - start))
-        if len(part) < min(step, count - start):
-            raise EOFError(f"truncated: only {start + len(part)} complete rows of {count}")
-        yield part
-
-
-def gather(parts: Iterator[np.ndarray], count: int, names: list[str]) -> dict[str, np.ndarray]:
-    """The fields `names`, each (count,), of rows that come some at a time."""
-    columns: dict[str, np.ndarray] = {}
-    start = 0
-    for part in parts:
-        for name in names:
-            if name not in columns:
-                columns[name] = np.empty(count, part.dtype[name])
-            columns[name][start : start + len(part)] = part[name]
-        start += len(part)
-    return columns or {name: np.empty(0) for name in names}
-
-
-def text_parts(file: BinaryIO, count: int, width: int) -> Iterator[tuple[int, np.ndarray]]:
-    """The next `count` rows of `width` numbers in a text file, some at a time: the number of the
-    first row, and the rows (m, width) float64.
-
-    Raises ValueError for rows that are too few, too long or too short, or no numbers.
-    """
-    place = file.tell()
-    if count_rows(file, count) < count:
-        raise ValueError(f"the file ends before row {count}")
-    file.seek(place)
-    step = max(1, _PART // (8 * width))
-    for start in range(0, count, step):
-        rows = min(step, count - start)
-        part = np.loadtxt(islice(text_rows(file), rows), ndmin=2, comments=None)
-        if part.shape != (rows, width):
-            raise ValueError(
-                f"found {start + part.shape[0]} rows of {part.shape[1]} values, "
-                f"expected {count} of {width}"
-            )
-        yield start, part
-
-
 def _read_binary_row(file: BinaryIO, element: Element, order: str) -> dict[str, float]:
     values = {}
     for p in element.properties:
@@ -318,7 +254,7 @@ def _take(file: BinaryIO, kind: str) -> float:
     return float(np.frombuffer(raw, kind)[0])
 
 
-def write_rows(path: Path, columns: Mapping[str, np.ndarray], comments: list[str]) -> None:
+def write_ply(path: Path, columns: Mapping[str, np.ndarray], comments: list[str]) -> None:
     """Write `columns`, each (n,), as the vertices of a binary little-endian PLY file, atomically.
 
     Floating-point columns keep their width, integers become uchar if they are uint8, else int.
@@ -342,22 +278,3 @@ def write_rows(path: Path, columns: Mapping[str, np.ndarray], comments: list[str
     lines += [f"property {names[kind[1:]]} {name}" for name, kind in layout]
     header = ("\n".join([*lines, "end_header"]) + "\n").encode("ascii", errors="replace")
     write_atomically(path, [header, table.data if rows else b""])
-
-
-def write_atomically(path: Path, parts: list[bytes | memoryview]) -> None:
-    """Write `parts` one after another to `path` so that it holds all of them or stays as it was.
-
-    Raises OutputError if the folder is missing, not writable or full.
-    """
-    # Named before it exists: whatever ends this process has it cleared away.
-    temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
-    try:
-        with open(temporary, "xb") as file:
-            for part in parts:
-                file.write(part)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink()

@@ -33,7 +33,7 @@ _WORDS = {
 """Pydantic's kinds of complaint in our words; it says the others itself."""
 
 
-class Strict(BaseModel):
+class StrictModel(BaseModel):
     """A model that takes no unknown key and no number that is not finite, and does not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -44,7 +44,7 @@ class Strict(BaseModel):
         return list(cls.model_fields)
 
 
-def explain(
+def validation_messages(
     error: ValidationError,
     model: type[BaseModel],
     place: Callable[[Location], str] = lambda location: ".".join(map(str, location)),
@@ -58,7 +58,7 @@ def explain(
     return [_line(dict(item), model, place) for item in error.errors(include_url=False)[:most]]
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def suggest_name(name: str, known: Iterable[str]) -> str:
     """The end of a message about an unknown name: the nearest known one, and all of them."""
     names = list(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
@@ -71,7 +71,7 @@ def _line(item: dict[str, Any], model: type[BaseModel], place: Callable[[Locatio
     where = _cut(place(location), _LONGEST_PLACE)
     if item["type"] == "extra_forbidden":
         keys = _keys_at(model, location[:-1])
-        return f"unknown key '{where}'{nearest(str(location[-1]), keys)}"
+        return f"unknown key '{where}'{suggest_name(str(location[-1]), keys)}"
     words = _WORDS.get(item["type"], item["msg"].removeprefix("Value error, "))
     words = words.format(**item.get("ctx", {})) if item["type"] in _WORDS else words
     value = item["input"]
@@ -94,7 +94,7 @@ def _keys_at(model: type[BaseModel], location: Location) -> list[str]:
             kind = _inner(kind.model_fields[part].annotation)
     if not _is_model(kind):
         return []
-    return kind.known_keys() if issubclass(kind, Strict) else list(kind.model_fields)
+    return kind.known_keys() if issubclass(kind, StrictModel) else list(kind.model_fields)
 
 
 def _inner(annotation: Any) -> Any:

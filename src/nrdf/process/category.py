@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nrdf.errors import ProcessError
-from nrdf.io.schema import nearest
+from nrdf.io.schema import suggest_name
 
 
 def known_categories() -> list[str]:
@@ -33,7 +33,7 @@ def check_category(category: str, model: str | Path | None = None) -> None:
     known = known_categories()
     if category not in known:
         raise ProcessError(
-            f"no model for the category '{category}'{nearest(category, known)}. With a model of "
-            "your own give --model; if it is meant all the same, set allow_unusual: true at the "
+            f"no model for the category '{category}'{suggest_name(category, known)}. With a model "
+            "of your own give --model; if it is meant all the same, set allow_unusual: true at the "
             "top of the file (nrdf knowledge new --allow-unusual)"
         )

@@ -9,7 +9,8 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.points import estimate_normals, thin
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.units import in_words
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
@@ -47,7 +48,7 @@ def check(
 ) -> list[Checked]:
     """Plan and measure every process on the reference; `progress` is told (done, all)."""
     # The same points as a model would work with.
-    kept = thin(lesson.cloud.points, WORKING_POINTS, np.random.default_rng(0))
+    kept = downsample(lesson.cloud.points, WORKING_POINTS, np.random.default_rng(0))
     cloud = lesson.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
     surface = Surface(cloud.points, normals)

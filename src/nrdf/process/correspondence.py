@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Mapped
@@ -53,7 +53,7 @@ class TaughtSurface:
     @cached_property
     def anchors(self) -> np.ndarray:
         """Even points (a,) of the working cloud whose places on a target are settled."""
-        return thin(self.taught.reference.points, _ANCHORS, np.random.default_rng(0))
+        return downsample(self.taught.reference.points, _ANCHORS, np.random.default_rng(0))
 
     @cached_property
     def template(self) -> RegistrationTemplate:
@@ -114,7 +114,7 @@ class Correspondence:
             whole.original(whole.points[anchors]), whole.original_normals(whole.normals[anchors])
         )
         start, facing = mapped.points, mapped.normals
-        at = thin(embedded.points, 2 * _ANCHORS, np.random.default_rng(1))
+        at = downsample(embedded.points, 2 * _ANCHORS, np.random.default_rng(1))
         moved = reference.template.register(
             embedded.points[at], embedded.normals[at], (start, facing)
         )

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from nrdf.io.names import same_file
+from nrdf.io.file_names import clashing_names
 from nrdf.process.quantities import (
     Angle,
     Direction,
@@ -329,7 +329,7 @@ class Knowledge(Quantities):
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"two regions are called '{twice}'; rename one")
-        if twins := same_file(names):
+        if twins := clashing_names(names):
             raise ValueError(
                 f"the regions '{twins[0]}' and '{twins[1]}' would be one file on Windows and "
                 "macOS; rename one"

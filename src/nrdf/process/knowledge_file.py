@@ -10,10 +10,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from nrdf.errors import ProcessError
+from nrdf.io.atomic import write_atomically
 from nrdf.io.files import read_file
-from nrdf.io.plain_data import read_json, read_yaml
-from nrdf.io.ply import write_atomically
-from nrdf.io.schema import Location, explain
+from nrdf.io.schema import Location, validation_messages
+from nrdf.io.yaml_json import read_json, read_yaml
 from nrdf.process.knowledge import VERSION, Knowledge
 from nrdf.process.knowledge_text import to_yaml
 
@@ -63,7 +63,7 @@ def validated(content: dict[str, Any], origin: str) -> Knowledge:
         return Knowledge.model_validate(content)
     except ValidationError as error:
         place = partial(_place, content=content)
-        faults = explain(error, Knowledge, place, _MOST_FAULTS)
+        faults = validation_messages(error, Knowledge, place, _MOST_FAULTS)
         raise ProcessError(listed(origin, faults, error.error_count())) from None
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from nrdf.geometry.units import OTHER_UNITS, in_words
-from nrdf.io.plain_data import to_yaml_line
+from nrdf.io.yaml_json import to_yaml_line
 from nrdf.process.knowledge import Knowledge
 
 HEADER = """\

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nrdf.geometry.units import in_words
-from nrdf.io.bounds import FROM_ZERO, SHARE
+from nrdf.io.bounds import FRACTION, NON_NEGATIVE
 from nrdf.process.transfer import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
 from nrdf.toolpath.metrics import Measures
@@ -64,7 +64,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if value is not None:
-                (SHARE if name == "min_coverage" else FROM_ZERO).check(name, value)
+                (FRACTION if name == "min_coverage" else NON_NEGATIVE).check(name, value)
 
     def broken(self, transferred: TransferResult) -> list[str]:
         """A line for each limit that is not met: by which region and process, and by how much."""

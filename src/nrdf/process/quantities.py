@@ -12,7 +12,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from nrdf.geometry.units import in_words, other_names, to_si
-from nrdf.io.schema import Strict
+from nrdf.io.schema import StrictModel
 
 _BOUNDS = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
 
@@ -102,7 +102,7 @@ PlainMapping = Annotated[dict[str, Any], AfterValidator(_plain)]
 """Whatever else is said: anything that YAML and JSON can hold."""
 
 
-class Quantities(Strict):
+class Quantities(StrictModel):
     """A strict model whose SI fields may be given in the units that people use."""
 
     model_config = ConfigDict(use_attribute_docstrings=True)

@@ -26,7 +26,7 @@ from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.units import in_words
-from nrdf.io.bounds import SHARE
+from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
 from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_doubts
@@ -148,7 +148,7 @@ class ProcessTransfer:
         RegionError for a marked region that is not taught or not on the target, ConfigError for a
         `min_confidence` that is no share.
         """
-        SHARE.check("min_confidence", min_confidence)
+        FRACTION.check("min_confidence", min_confidence)
         start = time.perf_counter()
         doubted: Sequence[str] = ()
         if isinstance(target, EncodedCloud):

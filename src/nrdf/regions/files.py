@@ -11,9 +11,9 @@ import numpy as np
 from nrdf.errors import RegionError
 from nrdf.geometry.units import METRES
 from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
+from nrdf.io.file_names import clashing_names
 from nrdf.io.files import open_file
 from nrdf.io.formats.arrays import array_head, open_arrays
-from nrdf.io.names import same_file
 from nrdf.regions.match import Match
 from nrdf.regions.region import region_name_fault
 from nrdf.viz.picture import region_colours
@@ -36,7 +36,7 @@ def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np
             if fault := region_name_fault(name):
                 raise RegionError(f"'{name}' in {path} is no name for a region: {fault}")
             regions[name] = values
-    if twins := same_file(regions):
+    if twins := clashing_names(regions):
         raise RegionError(
             f"the regions '{twins[0]}' and '{twins[1]}' would be one file on Windows and macOS; "
             "rename one of the files"

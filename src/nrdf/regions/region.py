@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import RegionError
 from nrdf.io.cloud import PointCloud
-from nrdf.io.names import file_name_fault
+from nrdf.io.file_names import file_name_problem
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""
@@ -30,7 +30,7 @@ def region_name_fault(name: str) -> str:
         )
     if len(name) > LONGEST_NAME:
         return f"it has {len(name)} characters, and at most {LONGEST_NAME} are allowed"
-    return file_name_fault(name)
+    return file_name_problem(name)
 
 
 def region_indices(

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from nrdf.io.atomic import write_json
 from nrdf.io.cloud import write_cloud
-from nrdf.io.output import REPORT, output_folder, write_json
+from nrdf.io.output import output_folder
+from nrdf.io.result_folder import REPORT
 from nrdf.process.bound_knowledge import checksum, overlaps
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.geometry.units import in_words
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 from nrdf.reports.transfer_report import FIGURES, figures, left_out_in_words
 from nrdf.viz.picture import region_colours
 

@@ -14,7 +14,9 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.field.yaw import at_yaws
-from nrdf.geometry.points import canonical_transform, estimate_normals, thin
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud, check_cloud
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
@@ -175,7 +177,7 @@ def align_scan(judge: PoseScorer, scan: PointCloud, up: np.ndarray | None = None
 
 
 def _prepare(scan: PointCloud) -> _Working:
-    kept = thin(scan.points, WORKING_POINTS, np.random.default_rng(0))
+    kept = downsample(scan.points, WORKING_POINTS, np.random.default_rng(0))
     centre, scale = canonical_transform(scan.points[kept])
     to_scan = Similarity(np.eye(3), centre, scale)
     points = to_scan.to_canonical(scan.points[kept])

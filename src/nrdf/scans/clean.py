@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from nrdf.errors import CloudError, unknown_name
-from nrdf.geometry.points import bounding_box, thin
+from nrdf.geometry.canonical import bounding_box
+from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud, check_coordinates
 from nrdf.scans.floor import Plane, find_floor
 from nrdf.scans.objects import separate_objects
@@ -100,7 +101,7 @@ def clean_scan(
 
     if "thin" not in skip:
         mask = np.zeros(len(kept), bool)
-        mask[thin(scan.points, MOST_POINTS, rng)] = True
+        mask[downsample(scan.points, MOST_POINTS, rng)] = True
         keep("thin", mask, f"{MOST_POINTS} points, evenly spread, are enough")
     if "duplicates" not in skip:
         mask = _first_of_equal(scan.points[kept])
@@ -113,7 +114,7 @@ def clean_scan(
             above = floor.height(scan.points[kept]) > floor.thickness
             keep("floor", above, "on or under the plane that carries the rest")
             up = floor.normal if up is None else up
-    working = kept[thin(scan.points[kept], WORKING_POINTS, rng)]
+    working = kept[downsample(scan.points[kept], WORKING_POINTS, rng)]
     if "outliers" not in skip:
         bad = _outliers(scan.points[working])
         mask = ~bad[_follow(scan.points[kept], scan.points[working])]

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nrdf.geometry.points import bounding_box, thin
+from nrdf.geometry.canonical import bounding_box
+from nrdf.geometry.sampling import downsample
 
 _SAMPLE = 3000  # points that hypotheses are tested on
 _HYPOTHESES = 400
@@ -38,7 +39,7 @@ def find_floor(points: np.ndarray, up: np.ndarray | None, rng: np.random.Generat
     lies under it and it reaches further than what stands on it in most directions: the flat
     underside of a sofa or a wing does not.
     """
-    sample = points[thin(points, _SAMPLE, rng)]
+    sample = points[downsample(points, _SAMPLE, rng)]
     low, high = bounding_box(sample)
     thickness = _THICKNESS * float((high - low).max())
     corners = sample[rng.integers(0, len(sample), (_HYPOTHESES, 3))]

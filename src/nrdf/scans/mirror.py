@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 
 _ITERATIONS = 10
 _POINTS = 700  # that are reflected
@@ -44,7 +44,7 @@ def mirror_plane(
     middle = (low + high) / 2
     points = points - middle
     tree = cKDTree(np.concatenate([points, _NORMAL_WEIGHT * normals], axis=1))
-    chosen = thin(points, _POINTS, np.random.default_rng(0))
+    chosen = downsample(points, _POINTS, np.random.default_rng(0))
     own, lines = points[chosen], normals[chosen]
     first = float(np.arctan2(start[0], start[2]))
     angle, offset = first, 0.0

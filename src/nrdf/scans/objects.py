@@ -7,7 +7,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from nrdf.geometry.points import bounding_box, one_per_cell, thin
+from nrdf.geometry.canonical import bounding_box
+from nrdf.geometry.sampling import downsample, one_per_cell
 from nrdf.io.cloud import PointCloud
 
 _POINTS = 8192
@@ -39,7 +40,7 @@ def separate_objects(points: np.ndarray, up: np.ndarray | None = None) -> np.nda
 
     What is smaller belongs to the nearest of them. up: as of `count_objects`.
     """
-    few = points[thin(points, _POINTS, np.random.default_rng(0))]
+    few = points[downsample(points, _POINTS, np.random.default_rng(0))]
     low, high = bounding_box(few)
     side = float((high - low).max())
     if side == 0.0:

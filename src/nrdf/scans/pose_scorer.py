@@ -20,7 +20,7 @@ from nrdf.field.base import Inverse
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, encoder_subset
 from nrdf.field.yaw import YawNetwork, find_yaw
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.families import FAMILY_NAMES, get_family
 
@@ -61,7 +61,7 @@ class PoseScorer:
         described = []
         with torch.inference_mode():
             for cloud in self._clouds:
-                chosen = thin(cloud.points, _FINE_POINTS, np.random.default_rng(0))
+                chosen = downsample(cloud.points, _FINE_POINTS, np.random.default_rng(0))
                 chosen = np.random.default_rng(0).permutation(chosen)
                 points = model.tensor(cloud.points[chosen])[None]
                 normals = model.tensor(cloud.normals[chosen])[None]

@@ -8,8 +8,8 @@ import igl
 import numpy as np
 
 from nrdf.errors import DataError
+from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import check_mesh
-from nrdf.geometry.points import canonical_transform
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 

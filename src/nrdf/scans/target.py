@@ -11,7 +11,7 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import WORKING_POINTS, CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import Similarity, up_axis
 from nrdf.geometry.units import METRES, Unit, find_unit
 from nrdf.io.cloud import PointCloud, in_metres
@@ -69,7 +69,7 @@ class AlignedScan:
     def kind(self) -> KindCheck:
         """Whether the object looks like one of the category, in the likeliest pose."""
         points = self.cleaned.cloud.points
-        points = points[thin(points, WORKING_POINTS, np.random.default_rng(0))]
+        points = points[downsample(points, WORKING_POINTS, np.random.default_rng(0))]
         points, model = self.pose.to_canonical(points), self.judge.model
         if model.kind_network is None:
             return by_judge(self.judge, self.alignment.best.field_cost, points)

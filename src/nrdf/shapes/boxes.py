@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import DataError
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
 from nrdf.shapes.dataset import (
     IndexRow,
     Shape,

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import DataError, OutputError
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 
 INDEX = "index.csv"
 SPLITS = ("train", "val", "test")

@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import CloudError, DataError, NrdfError, OutputError
-from nrdf.geometry.mesh import load_mesh, outer_skin
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.winding import mesh_winding_numbers
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.shapes.dataset import (
     INDEX,
     SPLITS,

@@ -12,7 +12,7 @@ import numpy as np
 
 from nrdf.errors import NrdfError, RegionError
 from nrdf.io.cloud import PointCloud
-from nrdf.io.names import usable_file_name
+from nrdf.io.file_names import safe_file_name
 from nrdf.process.bound_knowledge import BoundKnowledge, overlaps
 from nrdf.regions.region import region_name_fault
 from nrdf.studio.colours import next_colour
@@ -90,7 +90,7 @@ class Desk:
     def add_target(self, name: str, cloud: PointCloud) -> str:
         """Put an object, in metres, beside the others; the name that it got."""
         taken = [REFERENCE, *(t.object.name for t in self.document.targets)]
-        name = _free(usable_file_name(PurePath(shown_name(name)).stem, "target"), taken)
+        name = _free(safe_file_name(PurePath(shown_name(name)).stem, "target"), taken)
         target = Target(self.session.store(name, cloud))
         document = self.document
         self.session.change(replace(document, targets=(*document.targets, target)))

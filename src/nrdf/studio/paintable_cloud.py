@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.points import estimate_normals, thin
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.studio.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
@@ -25,7 +26,7 @@ class Body:
 
     def __init__(self, cloud: PointCloud) -> None:
         self.cloud = cloud
-        self.shown = thin(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        self.shown = downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0))
         self.points = cloud.points[self.shown]
         given = cloud.normals
         self.normals = estimate_normals(self.points) if given is None else given[self.shown]

@@ -14,9 +14,9 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.export.registry import export_job
-from nrdf.io.names import usable_file_name
+from nrdf.io.file_names import safe_file_name
 from nrdf.io.output import output_file, output_folder
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
 from nrdf.reports.job_folder import job_of, panel_of, write_job_files
@@ -92,4 +92,4 @@ def zipped(folder: Path) -> bytes:
 def place_of(desk: Desk, *parts: str) -> Path:
     """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
     # A session's file may have been written by somebody else, with any names.
-    return desk.session.folder.joinpath(SAVED, *(usable_file_name(p, "target") for p in parts))
+    return desk.session.folder.joinpath(SAVED, *(safe_file_name(p, "target") for p in parts))

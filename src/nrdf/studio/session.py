@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nrdf.errors import OutputError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.io.locks import remove_parts
+from nrdf.io.locks import remove_partial_files
 from nrdf.studio.document import Document, Loaded
 from nrdf.studio.session_file import (
     CLOUDS,
@@ -104,7 +104,7 @@ class Session:
         for path in (self.folder / CLOUDS).glob("cloud-*.ply"):
             if path.name not in {loaded.file for loaded in objects}:
                 path.unlink(missing_ok=True)
-        remove_parts(self.folder / CLOUDS)
+        remove_partial_files(self.folder / CLOUDS)
 
     def _go(self, taken: list[Document], kept: list[Document]) -> bool:
         if not taken:

@@ -23,10 +23,10 @@ from pydantic import (
 
 from nrdf.errors import NrdfError, OutputError, ProcessError
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
+from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.io.files import read_file
-from nrdf.io.ply import write_atomically
-from nrdf.io.schema import Strict, explain
+from nrdf.io.schema import StrictModel, validation_messages
 from nrdf.process.new_knowledge import KINDS
 from nrdf.regions.region import region_name_fault
 from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
@@ -99,12 +99,12 @@ class _Step(_Shown):
         return kind
 
 
-class _Object(Strict):
+class _Object(StrictModel):
     name: _Name
     file: str = Field(pattern=f"^{_CLOUD_FILE}$")
 
 
-class _Region(Strict):
+class _Region(StrictModel):
     name: Annotated[str, AfterValidator(_region_name)]
     colour: tuple[_Shade, _Shade, _Shade]
     indices: list[int]
@@ -115,7 +115,7 @@ class _Target(_Object):
     corrected: dict[str, list[int]] = Field(default_factory=dict)
 
 
-class _Content(Strict):
+class _Content(StrictModel):
     version: int = Field(ge=1)
     category: str = Field(min_length=1, max_length=100)
     allow_overlap: bool
@@ -156,7 +156,7 @@ def read_document(folder: Path) -> Document:
     except ValidationError as error:
         if _version(text) > VERSION:
             raise _newer(path) from None
-        faults = explain(error, _Content, lambda place: ".".join(map(str, place)), 1)
+        faults = validation_messages(error, _Content, lambda place: ".".join(map(str, place)), 1)
         raise ProcessError(f"{path} is damaged: {faults[0]}") from None
     if content.version > VERSION:
         raise _newer(path)

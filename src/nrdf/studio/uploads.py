@@ -10,7 +10,7 @@ import numpy as np
 from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
 from nrdf.errors import CloudError, NrdfError
 from nrdf.field.cloud_encoder import MINIMUM_POINTS, WORKING_POINTS
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.process.bound_knowledge import known_unit
 
@@ -73,7 +73,7 @@ def to_paint_on(cloud: PointCloud) -> PointCloud:
     """A reference as a model works with it: the same points that it would keep."""
     if len(cloud) <= WORKING_POINTS:
         return cloud
-    return cloud.select(thin(cloud.points, WORKING_POINTS, np.random.default_rng(0)))
+    return cloud.select(downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0)))
 
 
 def shown_name(name: str) -> str:

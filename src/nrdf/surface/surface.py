@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 
 if TYPE_CHECKING:
     from nrdf.surface.patch import Patch
@@ -53,7 +53,7 @@ class Surface:
             )
         self.size = len(points)
         kept = _distinct(points, normals)
-        self.kept = kept[thin(points[kept], MOST_POINTS, np.random.default_rng(0))]
+        self.kept = kept[downsample(points[kept], MOST_POINTS, np.random.default_rng(0))]
         self.points = points[self.kept]
         self.normals = unit(normals[self.kept])
         self.patches: dict[bytes, tuple[Patch, ...]] = {}

@@ -19,9 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.similarity import Similarity
+from nrdf.io.atomic import write_atomically
 from nrdf.io.files import read_file, require_file
-from nrdf.io.ply import write_atomically
-from nrdf.io.schema import Location, Strict, explain
+from nrdf.io.schema import Location, StrictModel, validation_messages
 from nrdf.toolpath.strategy import Strategy, Trajectory
 from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
@@ -138,7 +138,7 @@ def _early_kind(kind: Any) -> Any:
     return "retract" if kind == "departure" else kind
 
 
-class _SegmentContent(Strict):
+class _SegmentContent(StrictModel):
     kind: Annotated[SegmentKind, BeforeValidator(_early_kind)]
     line: int = Field(ge=0)
     positions_m: list[_Position] = Field(min_length=1)
@@ -159,7 +159,7 @@ class _SegmentContent(Strict):
         return Segment(positions=positions, **content)
 
 
-class _StrategyContent(Strict):
+class _StrategyContent(StrictModel):
     trajectory: Trajectory
     direction: _Position | None
     stepover_m: float
@@ -191,7 +191,7 @@ class _StrategyContent(Strict):
             raise ProcessError(f"{where}: {error}") from None
 
 
-class _PathContent(Strict):
+class _PathContent(StrictModel):
     region: _Name
     process: _Name
     tool: _Name
@@ -213,7 +213,7 @@ class _PathContent(Strict):
         return ToolPath(segments=made, **content)
 
 
-class _PoseContent(Strict):
+class _PoseContent(StrictModel):
     quaternion_xyzw: _Quaternion
     translation_m: _Position
     scale_m: _AboveZero
@@ -230,7 +230,7 @@ class _PoseContent(Strict):
         return Similarity(rotation, np.array(self.translation_m), self.scale_m)
 
 
-class _JobContent(_Version, Strict):
+class _JobContent(_Version, StrictModel):
     category: _Name
     frame: _Name
     paths: list[_PathContent]
@@ -253,7 +253,7 @@ def _parse(text: bytes, origin: str) -> Job:
             )
         content = _JobContent.model_validate_json(text)
     except ValidationError as error:
-        lines = explain(error, _JobContent, _place)[:_MOST_COMPLAINTS]
+        lines = validation_messages(error, _JobContent, _place)[:_MOST_COMPLAINTS]
         raise ProcessError(f"{origin}: " + "; ".join(lines)) from None
     paths = (path.made(f"{origin}: paths[{i}]") for i, path in enumerate(content.paths))
     pose = None if content.pose is None else content.pose.made(f"{origin}: pose")

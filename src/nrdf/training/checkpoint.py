@@ -16,8 +16,8 @@ from torch import Tensor, nn
 
 from nrdf.errors import ConfigError, ModelError, OutputError
 from nrdf.field.zoo import WEIGHTS
+from nrdf.io.atomic import write_atomically
 from nrdf.io.locks import new_token
-from nrdf.io.ply import write_atomically
 
 FOLDER = "checkpoints"
 IDENTITY = "run.json"

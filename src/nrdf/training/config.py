@@ -10,11 +10,11 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from nrdf.errors import ConfigError
 from nrdf.io.files import read_file
-from nrdf.io.plain_data import read_yaml
-from nrdf.io.schema import Strict, explain, nearest
+from nrdf.io.schema import StrictModel, suggest_name, validation_messages
+from nrdf.io.yaml_json import read_yaml
 
 
-class AugmentConfig(Strict):
+class AugmentConfig(StrictModel):
     """Random changes of the shapes; 0 switches one off."""
 
     scaling: float = Field(default=0.0, ge=0)
@@ -45,7 +45,7 @@ class AugmentConfig(Strict):
     """
 
 
-class DataConfig(Strict):
+class DataConfig(StrictModel):
     """How many points of what a batch holds, and which shapes meet in it."""
 
     encoder_points: int = Field(default=1024, ge=1)
@@ -70,7 +70,7 @@ class DataConfig(Strict):
     augment: AugmentConfig = AugmentConfig()
 
 
-class Stage(Strict):
+class Stage(StrictModel):
     """A stretch of training: which losses at which weights, which parts train, for how long."""
 
     name: str
@@ -96,7 +96,7 @@ class Stage(Strict):
 
         for name in weights:
             if name not in LOSSES:
-                raise ValueError(f"no loss '{name}'{nearest(name, LOSSES)}")
+                raise ValueError(f"no loss '{name}'{suggest_name(name, LOSSES)}")
         return weights
 
     @model_validator(mode="after")
@@ -106,7 +106,7 @@ class Stage(Strict):
         return self
 
 
-class OptimizerConfig(Strict):
+class OptimizerConfig(StrictModel):
     name: Literal["adam", "adamw"] = "adam"
     betas: tuple[float, float] = (0.9, 0.999)
     weight_decay: float = Field(default=0.0, ge=0)
@@ -114,7 +114,7 @@ class OptimizerConfig(Strict):
     """Bound on the gradient's norm."""
 
 
-class TrainConfig(Strict):
+class TrainConfig(StrictModel):
     """One training run, except for the data folders, the category and the device."""
 
     preset: str
@@ -167,4 +167,6 @@ def _validated(content: Mapping[str, Any], origin: str) -> TrainConfig:
     try:
         return TrainConfig.model_validate(dict(content))
     except ValidationError as error:
-        raise ConfigError(f"{origin}: " + "; ".join(explain(error, TrainConfig))) from None
+        raise ConfigError(
+            f"{origin}: " + "; ".join(validation_messages(error, TrainConfig))
+        ) from None

@@ -28,9 +28,10 @@ from nrdf.field.kind import (
     KindConfig,
     KindNetwork,
 )
-from nrdf.geometry.mesh import load_mesh, outer_skin
-from nrdf.geometry.points import canonical_transform
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.similarity import about_up, upright
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.shapes.boxes import Boxes
 from nrdf.shapes.dataset import INDEX
 from nrdf.shapes.prepare import find_meshes

@@ -22,7 +22,7 @@ from nrdf.field import build_field
 from nrdf.field.base import Field
 from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
-from nrdf.io.locks import claim
+from nrdf.io.locks import write_lock
 from nrdf.training.checkpoint import (
     Position,
     common_checkpoint,
@@ -70,7 +70,7 @@ def train(
     something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
     """
     out = Path(out)
-    with join_workers(device) as workers, claim(out) if workers.first else nullcontext():
+    with join_workers(device) as workers, write_lock(out) if workers.first else nullcontext():
         entries = list_shapes([Path(folder) for folder in data])
         bank = load_bank(entries, "train", config.data, workers.device)
         if bank.categories != {category}:

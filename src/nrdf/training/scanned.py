@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.errors import DataError
-from nrdf.geometry.points import seen_from
+from nrdf.geometry.visibility import seen_from
 from nrdf.shapes.dataset import read_shape
 from nrdf.training.provenance import Entry
 

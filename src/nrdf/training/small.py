@@ -18,7 +18,8 @@ from torch import Tensor, nn
 from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import WEIGHTS
-from nrdf.io.locks import claim, writing
+from nrdf.io.atomic import output_errors
+from nrdf.io.locks import write_lock
 from nrdf.training.checkpoint import (
     METRICS,
     Position,
@@ -68,7 +69,7 @@ def small_run(
         "category": category,
         "shapes": list(shapes),
     }
-    with claim(out):
+    with write_lock(out):
         if not open_run(out, identity, overwrite):
             write_identity(out, identity, environment(_alone()))
         yield
@@ -110,7 +111,7 @@ def run_steps(
         if (step + 1) % CHECKPOINT_EVERY == 0 or step + 1 == settings.steps:
             save_checkpoint(out, Position(0, step + 1, step + 1), network, optimizer, None)
             path = out / METRICS
-            with writing(path), open(path, "a", encoding="utf-8") as file:
+            with output_errors(path), open(path, "a", encoding="utf-8") as file:
                 file.write(json.dumps({"step": step + 1, "loss": round(mean, 4)}) + "\n")
         if progress is not None:
             progress(step + 1, settings.steps)

@@ -11,7 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from nrdf.geometry.points import fibonacci_directions, seen_from
+from nrdf.geometry.sampling import fibonacci_directions
+from nrdf.geometry.visibility import seen_from
 
 MOST_VIEWS = 4
 _LOWEST, _HIGHEST = -0.3, 0.97

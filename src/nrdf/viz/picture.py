@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.points import canonical_transform, estimate_normals, thin
-from nrdf.io.ply import write_atomically
+from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.normals import estimate_normals
+from nrdf.geometry.sampling import downsample
+from nrdf.io.atomic import write_atomically
 from nrdf.viz.render import FRONT, Camera, Scene, Strokes, render
 
 if TYPE_CHECKING:
@@ -125,7 +127,7 @@ def _prepare(panel: Panel, names: list[str]) -> Scene:
     # Where regions overlap, the one listed last is on top.
     for name, chosen in panel.regions.items():
         region[np.asarray(chosen)] = names.index(name)
-    kept = thin(points, MOST_POINTS, np.random.default_rng(0))
+    kept = downsample(points, MOST_POINTS, np.random.default_rng(0))
     centre, scale = canonical_transform(points[kept])
     points = (points[kept] - centre) / scale
     normals = estimate_normals(points) if panel.normals is None else panel.normals[kept]

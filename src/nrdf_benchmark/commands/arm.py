@@ -23,7 +23,7 @@ def arm(demo: Positional[Path], out: Path | None = None) -> None:
         demo: Folder that `nrdf demo` wrote.
         out: JSON file to write, with the report of every chair.
     """
-    from nrdf.io.output import write_json
+    from nrdf.io.atomic import write_json
     from nrdf_benchmark.arm import combine_reports, measure, simulate_demo
 
     with errors.status("simulation") as status:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
-from nrdf.io.bounds import Count, CountFromZero
+from nrdf.io.bounds import Count, NonNegativeCount
 
 
 def kind(
@@ -16,7 +16,7 @@ def kind(
     labelled: Path | None = None,
     others: Path | None = None,
     count: Count = 200,
-    scans_every: CountFromZero = 0,
+    scans_every: NonNegativeCount = 0,
     network: str | None = None,
     out: Path | None = None,
 ) -> None:
@@ -46,7 +46,7 @@ def kind(
     import nrdf
     from nrdf.errors import DataError
     from nrdf.field.kind import load_kind
-    from nrdf.io.output import write_json
+    from nrdf.io.atomic import write_json
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import kind as benchmark
 

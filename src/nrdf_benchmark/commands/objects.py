@@ -16,7 +16,7 @@ from nrdf.commands.console import (
     versions,
 )
 from nrdf.commands.one_run import one_run_at
-from nrdf.io.bounds import Count, CountFromZero, Within
+from nrdf.io.bounds import Bounds, Count, NonNegativeCount
 
 
 @one_run_at("out")
@@ -27,11 +27,11 @@ def objects(
     group: tuple[str, ...] = ("chair+stool",),
     method: tuple[str, ...] = ("nrdf", "registration", "box-mask", "box-normals"),
     model: str = "chair",
-    views: tuple[Annotated[int, Within(0, 20)], ...] = (0, 3, 1),
+    views: tuple[Annotated[int, Bounds(0, 20)], ...] = (0, 3, 1),
     normals: Literal["estimated", "given"] = "estimated",
-    points: Annotated[int, Within(256, 100_000)] = 8192,
+    points: Annotated[int, Bounds(256, 100_000)] = 8192,
     pairs: Count | None = None,
-    jobs: CountFromZero = 30,
+    jobs: NonNegativeCount = 30,
     device: str = "cpu",
     workers: Count | None = None,
     overwrite: bool = False,

@@ -7,17 +7,17 @@ from typing import Literal
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
 from nrdf.commands.one_run import one_run_at
-from nrdf.io.bounds import Count, CountFromZero
+from nrdf.io.bounds import Count, NonNegativeCount
 
 
 @one_run_at("out")
 def scans(
     category: Literal["chair", "car", "plane"],
     model: str | None = None,
-    members: CountFromZero = 25,
+    members: NonNegativeCount = 25,
     meshes: Path | None = None,
     every: Count = 1,
-    pairs: CountFromZero = 25,
+    pairs: NonNegativeCount = 25,
     device: str = "cpu",
     out: Path | None = None,
 ) -> None:
@@ -43,7 +43,7 @@ def scans(
     from itertools import chain, islice
 
     import nrdf
-    from nrdf.io.output import write_json
+    from nrdf.io.atomic import write_json
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import scans as benchmark
 

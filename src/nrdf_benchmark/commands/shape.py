@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from nrdf.commands.console import command_line, console, progress_bars, versions
 from nrdf.commands.one_run import one_run_at
-from nrdf.io.bounds import Count, Share, Within
+from nrdf.io.bounds import Bounds, Count, Fraction
 
 
 @one_run_at("out")
@@ -18,8 +18,8 @@ def shape(
     model: tuple[str, ...] = (),
     runs: Path = Path("runs"),
     split: Literal["test", "val", "train"] = "test",
-    level: Share = 0.75,
-    resolution: Annotated[int, Within(2, 1024)] = 64,
+    level: Fraction = 0.75,
+    resolution: Annotated[int, Bounds(2, 1024)] = 64,
     points: Count = 8192,
     device: str = "cpu",
     workers: Count | None = None,

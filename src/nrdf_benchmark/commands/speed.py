@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nrdf.commands.console import console, errors, show, table, versions
 from nrdf.commands.one_run import one_run_at
-from nrdf.io.bounds import Count, CountFromZero
+from nrdf.io.bounds import Count, NonNegativeCount
 
 if TYPE_CHECKING:
     from nrdf_benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
@@ -19,7 +19,7 @@ def speed(
     preset: tuple[str, ...] = ("default", "paper"),
     device: str = "cpu",
     repeats: Count = 7,
-    steps: CountFromZero = 3,
+    steps: NonNegativeCount = 3,
     out: Path | None = None,
 ) -> None:
     """Measure speed and memory of retrieval, transfer and training.
@@ -36,7 +36,7 @@ def speed(
         steps: Training steps a stage, of which the median is taken; 0 leaves training out.
         out: JSON file to write.
     """
-    from nrdf.io.output import write_json
+    from nrdf.io.atomic import write_json
     from nrdf_benchmark.latency import measure, to_json
     from nrdf_benchmark.transfer_speed import measure_transfer
 

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Literal
 
 from nrdf.commands.console import console, progress_bar, show, table
-from nrdf.io.bounds import CountFromZero, NotNegative
+from nrdf.io.bounds import NonNegative, NonNegativeCount
 
 
 def toolpaths(
     category: Literal["chair", "car", "plane", "table"],
     data: Path | None = None,
-    members: CountFromZero = 10,
+    members: NonNegativeCount = 10,
     trajectory: Literal["raster", "cross-hatch", "spiral", "contour"] = "raster",
-    edge_margin_mm: NotNegative = 0.0,
+    edge_margin_mm: NonNegative = 0.0,
 ) -> None:
     """Tool paths planned on known regions, measured.
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from nrdf.errors import CloudError, NrdfError
 from nrdf.geometry.units import METRES, unit_named
-from nrdf.io import ply
 from nrdf.io.files import open_file
-from nrdf.io.formats.raw import MOST_UNPACKED, RawCloud, colours_of
+from nrdf.io.formats.raw import MAX_UNPACKED_BYTES, RawCloud, colours_of
 from nrdf.io.formats.tables import table_cloud
+from nrdf.io.rows import MAX_POINTS
 
 Head = tuple[tuple[int, ...], np.dtype]
 _LONGEST_WORD = 1024  # bytes of a unit or frame
@@ -70,8 +70,8 @@ def _check_table(shape: tuple[int, ...], kind: np.dtype) -> None:
             f"a numeric table (n, 3), or (n, 6) with normals, is needed; this one is {shape} of "
             f"{kind}"
         )
-    if shape[0] > ply.MOST_POINTS:
-        raise ValueError(f"it has {shape[0]} points; at most {ply.MOST_POINTS} are read")
+    if shape[0] > MAX_POINTS:
+        raise ValueError(f"it has {shape[0]} points; at most {MAX_POINTS} are read")
 
 
 def _check_part(name: str, shape: tuple[int, ...], kind: np.dtype, count: int) -> None:
@@ -134,7 +134,7 @@ class Arrays:
             for info in self._archive.infolist()
             if info.filename.endswith(".npy")
         }
-        self._left = MOST_UNPACKED
+        self._left = MAX_UNPACKED_BYTES
 
     @property
     def names(self) -> list[str]:
@@ -153,8 +153,8 @@ class Arrays:
         self._left -= math.prod(shape) * kind.itemsize
         if self._left < 0:
             raise ValueError(
-                f"its arrays unpack to more than {MOST_UNPACKED / 1e9:g} GB; thin the cloud, or "
-                "write it as PLY"
+                f"its arrays unpack to more than {MAX_UNPACKED_BYTES / 1e9:g} GB; thin the "
+                "cloud, or write it as PLY"
             )
         with _strangers(), self._archive.open(self._members[name]) as file:
             return np.lib.format.read_array(file, allow_pickle=False)

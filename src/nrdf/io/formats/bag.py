@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import CloudError, unknown_name
-from nrdf.io import ply
 from nrdf.io.files import read_file, require_file
 from nrdf.io.formats.raw import RawCloud, colours_of, intensity_of, stack
+from nrdf.io.rows import MAX_POINTS
 
 logger = logging.getLogger(__name__)
 
@@ -95,7 +95,7 @@ def from_message(message: Any) -> RawCloud:
         names.append(str(field.name))
         formats.append(kind)
         offsets.append(int(field.offset))
-    if not 0 <= width * height <= ply.MOST_POINTS or message.row_step < width * step:
+    if not 0 <= width * height <= MAX_POINTS or message.row_step < width * step:
         raise ValueError(f"{height} rows of {width} points of {step} bytes")
     data = np.asarray(message.data, np.uint8)
     if len(data) < height * message.row_step:

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from nrdf.geometry.mesh import MOST_FACES
+from nrdf.geometry.mesh import MAX_FACES
 from nrdf.io import ply
+from nrdf.io.rows import count_rows
 
 _MOST_DESCRIPTION = 50_000_000  # bytes of a file in JSON or XML, which takes many times its size
 _FEWEST_STL = 84  # bytes of a binary STL without faces
@@ -54,8 +55,8 @@ def check_claims(path: Path, file: BinaryIO) -> None:
             tree = json.load(file)
             outside = _around(path, tree)
             faces = _check_gltf(tree, size + outside)
-    if faces > MOST_FACES:
-        raise ValueError(f"{faces} faces; at most {MOST_FACES} are used: simplify the mesh")
+    if faces > MAX_FACES:
+        raise ValueError(f"{faces} faces; at most {MAX_FACES} are used: simplify the mesh")
 
 
 def off_counts(file: BinaryIO) -> tuple[int, int]:
@@ -76,7 +77,7 @@ def off_counts(file: BinaryIO) -> tuple[int, int]:
     if not (0 <= points <= left // 6 + 1 and 0 <= faces <= left // 4 + 1):
         raise ValueError(f"truncated: {points} points, {faces} faces are more than the file holds")
     start = file.tell()
-    rows = ply.count_rows(file, points + faces)
+    rows = count_rows(file, points + faces)
     file.seek(start)
     if rows != points + faces:
         what = "truncated: " if rows < points + faces else "more rows than it claims: "

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.mesh import Mesh, load_mesh, outer_skin
-from nrdf.io import ply
+from nrdf.geometry.mesh import Mesh, outer_skin
 from nrdf.io.files import open_file
 from nrdf.io.formats.mesh_claims import check_claims, off_counts
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.io.formats.raw import RawCloud
+from nrdf.io.rows import text_rows
 
 logger = logging.getLogger(__name__)
 
@@ -31,7 +32,7 @@ def read_off(path: Path, mesh_samples: int) -> RawCloud:
                 return read_mesh(path, mesh_samples)
             if points == 0:
                 return RawCloud(np.empty((0, 3)))
-            rows = islice(ply.text_rows(file), points)
+            rows = islice(text_rows(file), points)
             table = np.loadtxt(rows, usecols=(0, 1, 2), ndmin=2, comments="#")
         except ValueError as error:
             raise CloudError(f"{path}: damaged OFF file: {error}") from error

@@ -10,9 +10,9 @@ from typing import BinaryIO
 import numpy as np
 
 from nrdf.errors import CloudError
-from nrdf.io import ply
 from nrdf.io.files import open_file
-from nrdf.io.formats.raw import MOST_UNPACKED, USED, RawCloud, colours_of, intensity_of, stack
+from nrdf.io.formats.raw import MAX_UNPACKED_BYTES, USED, RawCloud, colours_of, intensity_of, stack
+from nrdf.io.rows import MAX_POINTS, binary_parts, count_rows, gather, text_parts
 
 _LONGEST_HEADER = 1 << 16
 _LONGEST_ROW = 1 << 16  # bytes
@@ -99,8 +99,8 @@ def _read_columns(file: BinaryIO, said: dict[str, list[str]]) -> dict[str, np.nd
             "offsets": [field.offset for field in used],
             "itemsize": row,
         }
-        parts = ply.binary_parts(file, np.dtype(layout), count)  # type: ignore[call-overload]
-        return ply.gather(parts, count, names)
+        parts = binary_parts(file, np.dtype(layout), count)  # type: ignore[call-overload]
+        return gather(parts, count, names)
     if data == "binary_compressed":
         return _read_compressed(file, used, count, row, left)
     raise ValueError(f"DATA {data} is not known; known: ascii, binary, binary_compressed")
@@ -108,8 +108,8 @@ def _read_columns(file: BinaryIO, said: dict[str, list[str]]) -> dict[str, np.nd
 
 def _count(said: dict[str, list[str]]) -> int:
     count = int(said["POINTS"][0])
-    if not 0 <= count <= ply.MOST_POINTS:
-        raise ValueError(f"{count} points; at most {ply.MOST_POINTS} are read")
+    if not 0 <= count <= MAX_POINTS:
+        raise ValueError(f"{count} points; at most {MAX_POINTS} are read")
     if "WIDTH" in said and "HEIGHT" in said:
         width, height = int(said["WIDTH"][0]), int(said["HEIGHT"][0])
         if width * height != count:
@@ -143,12 +143,12 @@ def _read_text(
     file: BinaryIO, used: list[_Field], count: int, width: int, left: int
 ) -> dict[str, np.ndarray]:
     start = file.tell()
-    _check_length(ply.count_rows(file, count), count)
+    _check_length(count_rows(file, count), count)
     file.seek(start)
     if 2 * width * count > left + 1:  # each value takes a digit, and a space or a line end
         raise ValueError(f"truncated: {count} points of {width} values are more than it holds")
     columns = {field.name: np.empty(count, field.kind) for field in used}
-    for first, part in ply.text_parts(file, count, width):
+    for first, part in text_parts(file, count, width):
         for field in used:
             values = part[:, field.place]
             if field.kind.kind in "iu":
@@ -175,9 +175,9 @@ def _read_compressed(
         raise ValueError(f"{size} bytes do not make {count} points of {row} bytes")
     if packed > left - 8 or size > _LZF_BEST * packed:
         raise ValueError(f"truncated: no {size} bytes come of {min(packed, left - 8)}")
-    if size > MOST_UNPACKED:
+    if size > MAX_UNPACKED_BYTES:
         raise ValueError(
-            f"it unpacks to {size / 1e9:.1f} GB; at most {MOST_UNPACKED / 1e9:g} GB are read: "
+            f"it unpacks to {size / 1e9:.1f} GB; at most {MAX_UNPACKED_BYTES / 1e9:g} GB are read: "
             "write it with DATA binary"
         )
     raw = np.frombuffer(decompress_lzf(file.read(packed), size), np.uint8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.geometry.mesh import Mesh
 
-MOST_UNPACKED = 800_000_000
+MAX_UNPACKED_BYTES = 800_000_000
 """Bytes that a compressed file may unpack to; a small file can claim any number."""
 _INTENSITY = ("intensity", "scalar_Intensity", "scalar_intensity", "reflectance", "i")
 USED = {

@@ -16,7 +16,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from nrdf.errors import RobotError
-from nrdf.geometry.points import thin
+from nrdf.geometry.sampling import downsample
 from nrdf.geometry.winding import Winding, mesh_winding_numbers
 
 CELL_M = 0.008
@@ -84,7 +84,7 @@ def distance_field_from_points(points: np.ndarray, normals: np.ndarray) -> Signe
     drawn onto the points' planes, so that the surface is where it was scanned. Raises RobotError
     for an object too large for its cells.
     """
-    kept = thin(points, _MOST_POINTS, np.random.default_rng(0))
+    kept = downsample(points, _MOST_POINTS, np.random.default_rng(0))
     points = np.ascontiguousarray(points[kept], dtype=np.float64)
     normals = np.ascontiguousarray(normals[kept], dtype=np.float64)
     tree = cKDTree(points)
@@ -128,7 +128,8 @@ def distance_field_from_file(path: str | Path, points: np.ndarray) -> SignedDist
     Raises DataError for a file that cannot be read, and RobotError for a mesh that is not where
     the points are.
     """
-    from nrdf.geometry.mesh import load_mesh, outer_skin
+    from nrdf.geometry.mesh import outer_skin
+    from nrdf.io.formats.mesh_file import load_mesh
 
     vertices, faces = load_mesh(path)
     faces, _ = outer_skin(vertices, faces, 2000, np.random.default_rng(0))

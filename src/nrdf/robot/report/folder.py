@@ -7,7 +7,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from nrdf.io.output import REPORT, write_json
+from nrdf.io.atomic import write_json
+from nrdf.io.result_folder import REPORT
 from nrdf.robot.report.content import simulation_report
 from nrdf.robot.report.html_report import write_html_report
 from nrdf.robot.report.pictures import draw

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import write_atomically
 from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.simulation.execute import Log
 from nrdf.robot.simulation.scene import cell_specification

@@ -9,9 +9,8 @@ import numpy as np
 
 from nrdf.errors import RobotError
 from nrdf.export.names import identifier
-from nrdf.io.locks import writing
-from nrdf.io.names import spreadsheet_text
-from nrdf.io.ply import write_atomically
+from nrdf.io.atomic import output_errors, write_atomically
+from nrdf.io.file_names import spreadsheet_text
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.execute import Log
 from nrdf.robot.simulation.simulate import SimulationResult
@@ -68,7 +67,7 @@ def write_bag(folder: Path, simulated: SimulationResult) -> bool:
         whole, rest = divmod(round(value * 1e9), 1_000_000_000)
         return types[kind](whole, rest)
 
-    with writing(folder / BAG), Writer(folder / BAG, version=8) as writer:
+    with output_errors(folder / BAG), Writer(folder / BAG, version=8) as writer:
         clock = 0.0
         for number, driven in enumerate(simulated.paths, 1):
             topic = f"/nrdf/{identifier(f'p{number} {driven.path.region}', 48)}/joint_trajectory"

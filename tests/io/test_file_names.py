@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from nrdf.io.names import file_name_fault, same_file, spreadsheet_text, usable_file_name
+from nrdf.io.file_names import clashing_names, file_name_problem, safe_file_name, spreadsheet_text
 from nrdf.process.knowledge import Knowledge
 from nrdf.regions.region import region_name_fault
 from nrdf.robot.report.trajectories import _quoted
@@ -15,8 +15,8 @@ from nrdf.robot.report.trajectories import _quoted
     "name", ["seat", "back-front", "Sitzfläche 2", "座面", "con-seat", "console"]
 )
 def test_good_names_have_no_fault(name):
-    assert region_name_fault(name) == file_name_fault(name) == ""
-    assert usable_file_name(name, "x") == name
+    assert region_name_fault(name) == file_name_problem(name) == ""
+    assert safe_file_name(name, "x") == name
 
 
 @pytest.mark.parametrize(
@@ -48,15 +48,15 @@ def test_names_that_no_region_can_have(name):
     ],
 )  # fmt: skip
 def test_any_name_has_a_usable_one_near(name, usable):
-    found = usable_file_name(name, "x")
+    found = safe_file_name(name, "x")
     assert found == usable
     assert "/" not in found and found not in (".", "..") and len(found.encode()) <= 201
 
 
 def test_names_that_are_one_file_on_some_systems_are_found():
-    assert same_file(["seat", "back", "Seat"]) == ("seat", "Seat")
-    assert same_file(["Fläche", "Fla\u0308che"]) == ("Fläche", "Fla\u0308che")
-    assert same_file(["seat", "back"]) is None
+    assert clashing_names(["seat", "back", "Seat"]) == ("seat", "Seat")
+    assert clashing_names(["Fläche", "Fla\u0308che"]) == ("Fläche", "Fla\u0308che")
+    assert clashing_names(["seat", "back"]) is None
 
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-2", "@sum", "\t=1", "\r=1", "＝1"])

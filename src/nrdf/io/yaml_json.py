@@ -15,13 +15,13 @@ from typing import Any
 
 import yaml
 
-MOST_VALUES = 5_000_000
+MAX_VALUES = 5_000_000
 """Of a file, those behind YAML's aliases counted as often as they are used."""
-MOST_KEYS = 100_000
+MAX_KEYS = 100_000
 """Of a file, all mappings together."""
-DEEPEST = 50
+MAX_DEPTH = 50
 """Mappings and lists within each other."""
-LONGEST_NUMBER = 100
+MAX_DIGITS = 100
 """Digits and signs."""
 
 _PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -54,9 +54,9 @@ def read_yaml(text: str) -> Any:
 def read_json(text: str) -> Any:
     """The plain value of a JSON text. Raises ValueError as `read_yaml` does."""
     # Each value but the first of a mapping or list comes after a comma, each key before a colon.
-    if text.count(",") > MOST_VALUES:
+    if text.count(",") > MAX_VALUES:
         raise ValueError(_TOO_MANY)
-    if text.count(":") > MOST_KEYS:
+    if text.count(":") > MAX_KEYS:
         raise ValueError(_TOO_MANY_KEYS)
     try:
         read = json.loads(
@@ -66,7 +66,7 @@ def read_json(text: str) -> Any:
     except RecursionError:
         raise ValueError(_TOO_DEEP) from None
     deep = [read]
-    for _ in range(DEEPEST):
+    for _ in range(MAX_DEPTH):
         deep = [inner for outer in deep for inner in _inside(outer)]
     if any(isinstance(value, (dict, list)) for value in deep):
         raise ValueError(_TOO_DEEP)
@@ -82,9 +82,9 @@ def to_yaml_line(value: Any) -> str:
     return text.removesuffix("\n").removesuffix("\n...")
 
 
-_TOO_MANY = f"more than {MOST_VALUES:,} values, aliases included"
-_TOO_MANY_KEYS = f"more than {MOST_KEYS:,} keys"
-_TOO_DEEP = f"mappings and lists are nested more than {DEEPEST} deep"
+_TOO_MANY = f"more than {MAX_VALUES:,} values, aliases included"
+_TOO_MANY_KEYS = f"more than {MAX_KEYS:,} keys"
+_TOO_DEEP = f"mappings and lists are nested more than {MAX_DEPTH} deep"
 
 
 @dataclass
@@ -126,7 +126,7 @@ class _Reader:
             self._refuse_tag(event)
             if self._awaits_key():
                 raise ValueError(f"line {_line(event)}: a key must be text")
-            if len(self.open) >= DEEPEST:
+            if len(self.open) >= MAX_DEPTH:
                 raise ValueError(f"line {_line(event)}: {_TOO_DEEP}")
             content: dict[str, Any] | list[Any]
             content = {} if isinstance(event, yaml.MappingStartEvent) else []
@@ -148,7 +148,7 @@ class _Reader:
     def _add(self, event: yaml.Event, value: Any, amount: int = 1) -> None:
         """Put a value, or a key, where it belongs."""
         self.count += amount
-        if self.count > MOST_VALUES:
+        if self.count > MAX_VALUES:
             raise ValueError(_TOO_MANY)
         if not self.open:
             self.root = value
@@ -163,7 +163,7 @@ class _Reader:
                 raise ValueError(f"the key '{value}' occurs twice, again in line {_line(event)}")
             holder.key = value
             self.keys += 1
-            if self.keys > MOST_KEYS:
+            if self.keys > MAX_KEYS:
                 raise ValueError(_TOO_MANY_KEYS)
         else:
             if holder.key == "<<":
@@ -229,8 +229,8 @@ def _decimal(text: str) -> float:
 
 
 def _short(text: str) -> str:
-    if len(text) > LONGEST_NUMBER:
-        raise ValueError(f"a number of {len(text)} digits; {LONGEST_NUMBER} are the most")
+    if len(text) > MAX_DIGITS:
+        raise ValueError(f"a number of {len(text)} digits; {MAX_DIGITS} are the most")
     return text
 
 

@@ -5,15 +5,15 @@ import math
 import pytest
 from pydantic import Field, ValidationError
 
-from nrdf.io.schema import Strict, explain
+from nrdf.io.schema import StrictModel, validation_messages
 
 
-class Wheel(Strict):
+class Wheel(StrictModel):
     radius: float = Field(gt=0)
     material: str = "rubber"
 
 
-class Car(Strict):
+class Car(StrictModel):
     name: str
     wheels: list[Wheel] = Field(default=[])
     spare: Wheel | None = None
@@ -22,7 +22,7 @@ class Car(Strict):
 def complaints(content, **options):
     with pytest.raises(ValidationError) as caught:
         Car.model_validate(content)
-    return explain(caught.value, Car, **options)
+    return validation_messages(caught.value, Car, **options)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import os
 import pytest
 
 from nrdf.errors import OutputError
-from nrdf.io import locks, swap
+from nrdf.io import locks, result_folder
 from nrdf.io.output import output_folder
-from nrdf.io.swap import MANIFEST
+from nrdf.io.result_folder import MANIFEST
 
 
 @pytest.fixture(params=["renamed", "file by file"])
@@ -145,7 +145,7 @@ def test_where_renaming_fails_in_the_middle_the_old_result_is_back(tmp_path, mon
             raise PermissionError(13, "Permission denied")
         rename(source, target)
 
-    monkeypatch.setattr(swap.os, "rename", fails)
+    monkeypatch.setattr(result_folder.os, "rename", fails)
     with pytest.raises(OutputError, match="Permission denied; allow writing"):
         write(tmp_path / "result", {"a.csv": "2"})
     assert texts(tmp_path / "result") == {"a.csv": "1"}
@@ -161,7 +161,7 @@ def test_a_folder_that_is_in_use_gets_the_files_one_by_one(tmp_path, monkeypatch
             raise PermissionError(13, "Permission denied")
         rename(source, target)
 
-    monkeypatch.setattr(swap.os, "rename", in_use)
+    monkeypatch.setattr(result_folder.os, "rename", in_use)
     write(tmp_path / "result", {"a.csv": "2"})
     assert texts(tmp_path / "result") == {"a.csv": "2"}
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nrdf.errors import OutputError
+from nrdf.io.atomic import write_atomically
 from nrdf.io.files import read_file
 from nrdf.io.locks import beside, home, leftovers
-from nrdf.io.ply import write_atomically
 
 log = logging.getLogger(__name__)
 
@@ -48,8 +48,9 @@ def replace_folder(place: Path, new: Path, token: str) -> None:
 
     Beside each other: `place` becomes `.NAME.TOKEN.old`, `new` becomes `place`, and what nrdf did
     not write moves over from the old one, of which nothing is left. At any moment there is the old
-    or the new result, or, between two calls, neither: `restore` puts the old one back. A folder
-    that cannot be moved gets the files one by one, its report removed first and written last.
+    or the new result, or, between two calls, neither: `restore_folder` puts the old one back. A
+    folder that cannot be moved gets the files one by one, its report removed first and written
+    last.
     """
     if not os.path.lexists(place):
         os.rename(new, place)
@@ -68,7 +69,7 @@ def replace_folder(place: Path, new: Path, token: str) -> None:
     _keep(old, place)
 
 
-def restore(place: Path) -> None:
+def restore_folder(place: Path) -> None:
     """Finish what a run that was killed in `replace_folder` had begun; the caller holds the claim.
 
     What it set aside comes back where there is nothing in its place; else other people's files in

@@ -6,22 +6,22 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-DEVICES = frozenset(
+WINDOWS_DEVICES = frozenset(
     ["con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(10))]
 )
 """File names that Windows, and so many a controller, keeps for itself."""
-LONGEST = 200
+MAX_NAME_BYTES = 200
 """Bytes that a name may have: file systems take 255, and endings come on top."""
 
 
-def file_name_fault(name: str) -> str:
+def file_name_problem(name: str) -> str:
     """Why `name`, with an ending, is no good name for a file; "" where it is one.
 
     Separators are the caller's to look for, in what characters are allowed at all.
     """
     size = len(name.encode("utf-8", "surrogatepass"))
-    if size > LONGEST:
-        return f"it has {size} bytes, and a file's name has room for {LONGEST}: shorten it"
+    if size > MAX_NAME_BYTES:
+        return f"it has {size} bytes, and a file's name has room for {MAX_NAME_BYTES}: shorten it"
     if name.endswith((".", " ")):
         return "it ends with a dot or a space, which Windows leaves out"
     if _is_device(name):
@@ -29,16 +29,16 @@ def file_name_fault(name: str) -> str:
     return ""
 
 
-def usable_file_name(name: str, otherwise: str) -> str:
+def safe_file_name(name: str, otherwise: str) -> str:
     """The name nearest to `name` that a file can have on every system; `otherwise` where nothing
     is left of it."""
     name = re.sub(r"[^\w .+-]", "-", name).strip(". ")
-    while len(name.encode("utf-8", "surrogatepass")) > LONGEST:
+    while len(name.encode("utf-8", "surrogatepass")) > MAX_NAME_BYTES:
         name = name[:-1].rstrip(". ")
     return f"{name}-" if _is_device(name) else name or otherwise
 
 
-def same_file(names: Iterable[str]) -> tuple[str, str] | None:
+def clashing_names(names: Iterable[str]) -> tuple[str, str] | None:
     """Two of `names` that would be one file where capitals or ways to write accents do not count,
     as on Windows and macOS; None where there are none."""
     known: dict[str, str] = {}
@@ -60,4 +60,4 @@ _FORMULA = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t", "\r", "\n")
 
 
 def _is_device(name: str) -> bool:
-    return name.partition(".")[0].strip().lower() in DEVICES
+    return name.partition(".")[0].strip().lower() in WINDOWS_DEVICES

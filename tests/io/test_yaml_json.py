@@ -9,8 +9,8 @@ import time
 import pytest
 import yaml
 
-from nrdf.io import plain_data
-from nrdf.io.plain_data import DEEPEST, read_json, read_yaml, to_yaml_line
+from nrdf.io import yaml_json
+from nrdf.io.yaml_json import MAX_DEPTH, read_json, read_yaml, to_yaml_line
 from nrdf.training.config import CONFIG_FOLDER
 
 LEVELS = list(zip("abcdefgh", "bcdefghi", strict=True))
@@ -52,7 +52,7 @@ def test_aliases_and_merges():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[" * 1_000_000, f"line 1: mappings and lists are nested more than {DEEPEST} deep"),
+        ("[" * 1_000_000, f"line 1: mappings and lists are nested more than {MAX_DEPTH} deep"),
         ("- " * 100_000, "nested more than"),
         ("{a: " * 100_000, "nested more than"),
         (LAUGHS, "more than 5,000,000 values, aliases included"),
@@ -100,8 +100,8 @@ def test_hostile_json_is_refused(text, message):
 
 
 def test_what_is_too_much_is_refused(monkeypatch):
-    monkeypatch.setattr(plain_data, "MOST_VALUES", 5)
-    monkeypatch.setattr(plain_data, "MOST_KEYS", 2)
+    monkeypatch.setattr(yaml_json, "MAX_VALUES", 5)
+    monkeypatch.setattr(yaml_json, "MAX_KEYS", 2)
     for read, many, keys in (
         (read_yaml, "[1, 2, 3, 4, 5, 6]", "{a: {b: {c: 1}}}"),
         (read_json, "[1, 2, 3, 4, 5, 6, 7]", '{"a": {"b": {"c": 1}}}'),
