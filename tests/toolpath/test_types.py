@@ -18,6 +18,13 @@ def test_waypoints_are_the_poses_of_a_segment_in_order():
     assert [w.quaternion_xyzw.tolist() for w in made] == quaternions.tolist()
 
 
+def test_axes_are_tool_z():
+    half = np.sqrt(0.5)
+    turned = np.array([[half, 0.0, 0.0, half], [0.0, 0.0, 0.0, 1.0]])  # about x, and not at all
+    made = Segment("process", 0, np.zeros((2, 3)), turned, 0.1)
+    np.testing.assert_allclose(made.axes, [[0, -1, 0], [0, 0, 1]], atol=1e-12)
+
+
 def test_groups_are_process_segments_with_the_moves_beside_them():
     kinds = ("approach", "process", "retract", "transition", "approach", "process", "process")
     segments = tuple(segment(kind, line) for line, kind in enumerate(kinds))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.similarity import Similarity
 from nrdf.toolpath.strategy import Strategy
@@ -46,6 +48,11 @@ class Segment:
     feed_m_s: float
     force_n: float | None = None
     dwell_s: float = 0.0
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """The tool's axes (n, 3), unit: tool z, into the part, in the job's frame."""
+        return np.asarray(Rotation.from_quat(self.quaternions_xyzw).as_matrix()[:, :, 2])
 
     @property
     def waypoints(self) -> tuple[Waypoint, ...]:
