@@ -97,9 +97,9 @@ def teach(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
     from nrdf.process.bound_knowledge import read_bound_knowledge
     from nrdf.process.transfer import ProcessTransfer
 
-    lesson = read_bound_knowledge(knowledge)
+    bound_knowledge = read_bound_knowledge(knowledge)
     return ProcessTransfer(
-        lesson, load_model(lesson.knowledge.category) if model is None else model
+        bound_knowledge, load_model(bound_knowledge.knowledge.category) if model is None else model
     )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import nrdf
-from nrdf.process.bound_knowledge import bind
+from nrdf.process.bound_knowledge import resolve
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
@@ -45,7 +45,7 @@ class TransferSpeed:
     phases: dict[str, float]
 
 
-def lesson_of_regions() -> Knowledge:
+def knowledge_of_regions() -> Knowledge:
     """A raster on each of the eight largest named regions of a family's chair."""
     family, cloud = get_family(CATEGORY), example(1)
     surface = family.member(1).sample_surface(POINTS, np.random.default_rng(1))
@@ -63,7 +63,7 @@ def lesson_of_regions() -> Knowledge:
 
 def measure_transfer(device: str = "cpu", repeats: int = 5) -> TransferSpeed:
     """Speed of a transfer with the category's model in the zoo, after one that warms up."""
-    teacher = ProcessTransfer(bind(lesson_of_regions()), nrdf.load_model(CATEGORY, device))
+    teacher = ProcessTransfer(resolve(knowledge_of_regions()), nrdf.load_model(CATEGORY, device))
     walls, cpus, phases = [], [], []
     for seed in range(2, 3 + repeats):
         target = example(seed)

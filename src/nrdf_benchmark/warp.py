@@ -31,7 +31,7 @@ SMALLEST_REGION = 60
 _PRESENT = 20  # points of the target's cloud from which on it has a region
 _TRUTH_POINTS = 40_000
 _RASTER = {
-    "kind": "custom", "name": "raster", "transfer": "carry", "stepover_m": 0.03,
+    "kind": "custom", "name": "raster", "transfer": "warp", "stepover_m": 0.03,
     "spacing_m": 0.01, "tool": {"radius_m": 0.025}, "feed_m_s": 0.1,
 }  # fmt: skip
 
@@ -87,7 +87,7 @@ def evaluate_warp(
         teacher = ProcessTransfer(_lesson(category, family, here), model)
         embedded = model.encode(PointCloud(there.points, there.normals))
         way = Correspondence(teacher.reference, embedded)
-        matches = teacher.taught.retrieve_all(teacher.lesson.regions, embedded)
+        matches = teacher.taught.retrieve_all(teacher.bound_knowledge.regions, embedded)
         named = family.region_of(there.coordinates)
         truth = _Truth(reference, target, rng)
         found = []

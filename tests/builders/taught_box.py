@@ -63,7 +63,7 @@ MEASURES = Measures(
 
 def made_up(confidence=0.8, measures=MEASURES, missing="", reason="", **changes):
     """A transfer of one process, of these figures, that nobody planned."""
-    taught = lesson({"top": [{**SAND, **changes}]})
+    taught = bound_knowledge({"top": [{**SAND, **changes}]})
     (process,) = taught.knowledge.regions[0].processes
     match = Match(taught.regions["top"], np.zeros((0, 3)), np.full(100, confidence), "mask")
     line = taught.cloud.points[taught.regions["top"]][:5]
@@ -71,13 +71,20 @@ def made_up(confidence=0.8, measures=MEASURES, missing="", reason="", **changes)
     segment = Segment("process", 0, line, held, process.feed_m_s, process.force_n)
     path = None if missing or reason else tool_path("top", process, [segment])
     step = PathResult(
-        "top", 0, process, process.way, path, measures if path else None, (), missing or reason
+        "top",
+        0,
+        process,
+        process.transfer_mode,
+        path,
+        measures if path else None,
+        (),
+        missing or reason,
     )
     regions = {"top": FoundRegion("top", match, missing)}
     return TransferResult(taught, taught.cloud, regions, (step,), (), {"regions": 0.3})
 
 
-def lesson(processes, reference=None, **changes):
+def bound_knowledge(processes, reference=None, **changes):
     """Knowledge of processes by face, on a box."""
     reference = cloud() if reference is None else reference
     regions = {name: faces(reference)[name] for name in processes}

@@ -123,7 +123,7 @@ def test_a_box_is_no_chair_and_ends_with_3_after_writing(taught, untrained, caps
     said = " ".join(capsys.readouterr().err.split())
     assert "the target does not look like a chair" in said and "--any-kind" in said
     report = json.loads((taught / "job" / "report.json").read_text())
-    assert not report["kind"]["fits"] and report["kind"]["warnings"][0] in report["doubts"]
+    assert not report["kind"]["fits"] and report["kind"]["warnings"][0] in report["strict_warnings"]
     assert report["kind"]["warnings"][0] in report["warnings"]
     assert (taught / "job" / "toolpaths.json").exists()
     assert transfer(taught, untrained, "--overwrite") == 0
@@ -148,15 +148,15 @@ def test_without_any_tool_path_each_region_says_why_and_a_hint_follows(taught, u
     assert "is y the direction that points up?" in capsys.readouterr().err
 
 
-def test_strict_takes_no_doubt_and_the_result_is_written(taught, untrained, capsys):
+def test_strict_takes_no_warning_and_the_result_is_written(taught, untrained, capsys):
     write_cloud(taught / "new.ply", PointCloud(1000 * cloud(seed=1).points))
     assert transfer(taught, untrained) == 0
     assert "does not say its unit; taken to be mm" in " ".join(capsys.readouterr().err.split())
     assert transfer(taught, untrained, "--strict", "--overwrite") == 3
     said = " ".join(capsys.readouterr().err.split())
     assert "nrdf: doubtful, with --strict:" in said and "taken to be mm" in said
-    doubts = json.loads((taught / "job" / "report.json").read_text())["doubts"]
-    assert "taken to be mm" in doubts[0] and (taught / "job" / "toolpaths.json").exists()
+    warnings = json.loads((taught / "job" / "report.json").read_text())["strict_warnings"]
+    assert "taken to be mm" in warnings[0] and (taught / "job" / "toolpaths.json").exists()
 
 
 def test_a_placeholder_says_what_to_do(files, capsys):

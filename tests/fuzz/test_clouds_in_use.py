@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from builders.awkward import OFFSETS, SCALES, clouds
 from builders.fuzzing import outcome_of, tries
-from builders.taught_box import SAND, cloud, lesson
+from builders.taught_box import SAND, bound_knowledge, cloud
 from builders.tiny_field import TinyField
 from nrdf.io.cloud import PointCloud
 from nrdf.process.transfer import ProcessTransfer
@@ -30,7 +30,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def teacher(model):
-    return ProcessTransfer(lesson({"top": [SAND]}, cloud(count=800)), model)
+    return ProcessTransfer(bound_knowledge({"top": [SAND]}, cloud(count=800)), model)
 
 
 @st.composite

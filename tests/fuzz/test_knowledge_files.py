@@ -13,8 +13,8 @@ from builders.fuzzing import altered, damaged, message_of, outcome_of, tries
 from builders.taught_box import SAND, cloud, faces
 from nrdf.errors import NrdfError
 from nrdf.io.cloud import write_cloud
-from nrdf.process.bound_knowledge import BoundKnowledge, bind
-from nrdf.process.check import Checked, check
+from nrdf.process.bound_knowledge import BoundKnowledge, resolve
+from nrdf.process.check import CheckedProcess, check_knowledge
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
 from nrdf.toolpath import effort
@@ -73,21 +73,23 @@ def read(folder, content: bytes, name: str = "k.yaml"):
 
 
 def use(folder, knowledge):
-    """Write it, read it, bind it to its reference, plan every process."""
+    """Write it, read it, resolve it on its reference, plan every process."""
     write_knowledge(folder / "again.yaml", knowledge)
     written = (folder / "again.yaml").read_bytes()
     write_knowledge(folder / "again.yaml", read_knowledge(folder / "again.yaml"))
     assert (folder / "again.yaml").read_bytes() == written  # but for a number's last digits
-    lesson = outcome_of(lambda: bind(knowledge, folder))
-    if isinstance(lesson, BoundKnowledge):
-        for row in outcome_of(lambda: check(lesson)):
-            assert isinstance(row, Checked) and (row.fault == "") == (row.measures is not None)
+    bound_knowledge = outcome_of(lambda: resolve(knowledge, folder))
+    if isinstance(bound_knowledge, BoundKnowledge):
+        for row in outcome_of(lambda: check_knowledge(bound_knowledge)):
+            assert isinstance(row, CheckedProcess) and (row.fault == "") == (
+                row.measures is not None
+            )
 
 
 def test_the_seed_is_good(folder):
     knowledge = read(folder, TEXT)
     assert isinstance(knowledge, Knowledge)
-    rows = check(bind(knowledge, folder))
+    rows = check_knowledge(resolve(knowledge, folder))
     assert [row.fault for row in rows] == ["", "", ""]
 
 
@@ -163,7 +165,7 @@ def test_what_was_found_once_is_refused(folder, place, by):
     (folder / "k.yaml").write_text(text.replace(place, by, 1))
 
     def use_it():
-        check(bind(read_knowledge(folder / "k.yaml"), folder))
+        check_knowledge(resolve(read_knowledge(folder / "k.yaml"), folder))
 
     assert len(message_of(use_it)) < 2000
 
@@ -179,4 +181,4 @@ def test_a_pipe_in_any_place_is_refused_at_once(folder):
     for place in ("cloud: box.ply", "file: top.ply"):
         text = TEXT.decode().replace(place, f"{place.split()[0]} pipe.ply", 1)
         (folder / "k.yaml").write_text(text)
-        assert "pipe" in message_of(lambda: bind(read_knowledge(folder / "k.yaml"), folder))
+        assert "pipe" in message_of(lambda: resolve(read_knowledge(folder / "k.yaml"), folder))

@@ -62,10 +62,10 @@ def test_several_processes_keep_their_order():
     assert [process.label for process in found] == ["sand", "oil", "sand, fine"]
 
 
-def test_taught_lines_are_carried_and_strategies_planned_anew_unless_asked_otherwise():
-    assert Process.model_validate(TAUGHT).way == "carry"
-    assert Process.model_validate(SAND).way == "replan"
-    assert Process.model_validate({**SAND, "transfer": "carry"}).way == "carry"
+def test_taught_lines_are_warped_and_strategies_planned_anew_unless_asked_otherwise():
+    assert Process.model_validate(TAUGHT).transfer_mode == "warp"
+    assert Process.model_validate(SAND).transfer_mode == "replan"
+    assert Process.model_validate({**SAND, "transfer": "warp"}).transfer_mode == "warp"
 
 
 def test_the_overlap_gives_the_stepover():
@@ -101,7 +101,7 @@ def test_the_overlap_gives_the_stepover():
         ({"force_n": 9, "force_tolerance_n": 9}, "it must be below force_n, 9"),
         ({"trajectory": "taught"}, "trajectory is taught: give its waypoints"),
         ({**TAUGHT, "waypoints": []}, "trajectory is taught: give its waypoints"),
-        ({**TAUGHT, "transfer": "replan"}, "use transfer: carry"),
+        ({**TAUGHT, "transfer": "replan"}, "use transfer: warp"),
         ({"waypoints": TAUGHT["waypoints"]}, "waypoints need trajectory: taught, not raster"),
         ({**TAUGHT, "waypoints": [{"positions_m": [[0, 0]]}]}, "line 1, positions_m"),
         ({**TAUGHT, "waypoints": [{"positions_m": [[0, 0, 0]], "quaternions_xyzw": []}]},

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from builders.taught_box import MEASURES, made_up
-from nrdf.process.limits import Limits, doubts_of
+from nrdf.process.limits import Limits, strict_warnings
 from nrdf.regions.presence import ABSENT, NOT_OBSERVED, Presence
 
 
@@ -64,9 +64,11 @@ def test_a_single_line_has_no_spacing_to_be_too_wide():
 
 
 def test_what_is_sure_is_not_doubted():
-    assert doubts_of(made_up(confidence=0.5)) == []
-    assert doubts_of(with_match(made_up(missing="absent"), presence=absent(0.95))) == []
-    assert doubts_of(with_match(made_up(missing="marked as not there"), method="marked")) == []
+    assert strict_warnings(made_up(confidence=0.5)) == []
+    assert strict_warnings(with_match(made_up(missing="absent"), presence=absent(0.95))) == []
+    assert (
+        strict_warnings(with_match(made_up(missing="marked as not there"), method="marked")) == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,18 +76,18 @@ def test_what_is_sure_is_not_doubted():
     [
         (made_up(confidence=0.3), "region 'top': doubtful: confidence 0.30; look at it"),
         (made_up(missing="confidence 0.10, below 0.2"), "perhaps there all the same: confidence"),
-        (replace(made_up(), doubts=("the pose is ambiguous",)), "the pose is ambiguous"),
+        (replace(made_up(), target_warnings=("the pose is ambiguous",)), "the pose is ambiguous"),
     ],
 )
 def test_what_is_doubtful_is_said(transferred, message):
-    (line,) = doubts_of(transferred)
+    (line,) = strict_warnings(transferred)
     assert message in line
 
 
 def test_a_region_that_may_be_there_is_doubtful():
     for presence in (absent(0.6), Presence(NOT_OBSERVED, 0.95, 0.0, 0.0)):
         skipped = with_match(made_up(missing="skipped"), presence=presence)
-        assert doubts_of(skipped) == ["region 'top': perhaps there all the same: skipped"]
+        assert strict_warnings(skipped) == ["region 'top': perhaps there all the same: skipped"]
 
 
 def absent(confidence):

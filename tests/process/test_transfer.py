@@ -11,7 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import nrdf
-from builders.taught_box import SAND, SIZE, cloud, faces, lesson
+from builders.taught_box import SAND, SIZE, bound_knowledge, cloud, faces
 from nrdf.errors import CloudError, ModelError
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import Mesh
@@ -37,7 +37,7 @@ def model(untrained):
 
 @pytest.fixture(scope="module")
 def transferred(model):
-    taught = lesson({"top": [SAND, {**SAND, "transfer": "carry", "passes": 2}],
+    taught = bound_knowledge({"top": [SAND, {**SAND, "transfer": "warp", "passes": 2}],
                      "right": [OIL], "front": [TAUGHT]})  # fmt: skip
     return ProcessTransfer(taught, model).transfer(cloud(seed=1))
 
@@ -48,10 +48,10 @@ def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(mod
     moved = PointCloud(turn.apply(target.points) + OFFSET, turn.apply(target.normals), unit="m")
     centre, scale = canonical_transform(target.points)
     pose = Similarity(turn.as_matrix(), turn.apply(centre) + OFFSET, scale)
-    job = ProcessTransfer(transferred.lesson, model).transfer(model.encode(moved, pose))
+    job = ProcessTransfer(transferred.bound_knowledge, model).transfer(model.encode(moved, pose))
     assert [step.reason for step in job.paths] == ["", "", "", ""]
     for step, turned in zip(transferred.paths, job.paths, strict=True):
-        if step.way != "carry":  # planning breaks ties of direction by the target's axes
+        if step.transfer_mode != "warp":  # planning breaks ties of direction by the target's axes
             continue
         for segment, there in zip(process_segments(step), process_segments(turned), strict=True):
             np.testing.assert_allclose(
@@ -68,7 +68,7 @@ def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(mod
 
 
 def test_a_target_may_be_a_file_or_an_array(model, tmp_path):
-    teacher = ProcessTransfer(lesson({"top": [SAND]}), model)
+    teacher = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
     target = cloud(seed=1)
     write_cloud(tmp_path / "new.ply", target)
     from_file = teacher.transfer(tmp_path / "new.ply")
@@ -101,7 +101,7 @@ def test_regions_are_those_of_the_target(transferred):
 
 def test_a_strategy_is_planned_anew_on_the_target(transferred):
     step = transferred.paths[1]
-    assert step.way == "replan" and step.process.trajectory == "raster"
+    assert step.transfer_mode == "replan" and step.process.trajectory == "raster"
     positions = np.concatenate([segment.positions for segment in process_segments(step)])
     np.testing.assert_allclose(positions[:, 1], SIZE[1] / 2, atol=2e-3)
     assert step.measures.coverage > 0.9
@@ -111,8 +111,8 @@ def test_a_strategy_is_planned_anew_on_the_target(transferred):
 
 def test_a_carried_strategy_has_the_references_lines(transferred):
     step = transferred.paths[2]
-    assert step.way == "carry" and step.process.trajectory == "taught"
-    assert step.process.transfer is None and step.process.way == "carry"
+    assert step.transfer_mode == "warp" and step.process.trajectory == "taught"
+    assert step.process.transfer is None and step.process.transfer_mode == "warp"
     once = len(step.process.waypoints)
     assert len(process_segments(step)) == 2 * once >= 10
     first = np.array(step.process.waypoints[0].positions_m)
@@ -134,7 +134,7 @@ def test_free_parameters_go_along(transferred):
 
 
 def test_a_direction_is_in_the_targets_frame(model):
-    turned = lesson({"top": [{**SAND, "direction": [0, 0, 1]}]})
+    turned = bound_knowledge({"top": [{**SAND, "direction": [0, 0, 1]}]})
     step = ProcessTransfer(turned, model).transfer(cloud(seed=1)).paths[0]
     assert abs(step.process.direction[2]) > 0.99
     line = process_segments(step)[1].positions
@@ -142,7 +142,7 @@ def test_a_direction_is_in_the_targets_frame(model):
 
 
 def test_a_region_that_is_not_there_is_skipped_never_invented(model):
-    taught = ProcessTransfer(lesson({"top": [SAND, OIL], "right": [SAND]}), model)
+    taught = ProcessTransfer(bound_knowledge({"top": [SAND, OIL], "right": [SAND]}), model)
     result = taught.transfer(cloud(seed=1), min_confidence=1.0)
     assert all(step.path is None and step.measures is None for step in result.paths)
     assert ", below 1" in result.regions["top"].missing
@@ -152,7 +152,9 @@ def test_a_region_that_is_not_there_is_skipped_never_invented(model):
 
 def test_a_process_that_does_not_fit_the_target_is_left_out_with_the_reason(model):
     wide = {**SAND, "edge_margin_mm": 100}
-    small = ProcessTransfer(lesson({"top": [wide, SAND]}), model).transfer(cloud(SIZE / 4, seed=1))
+    small = ProcessTransfer(bound_knowledge({"top": [wide, SAND]}), model).transfer(
+        cloud(SIZE / 4, seed=1)
+    )
     assert small.paths[0].path is None
     assert "edge_margin_m is 0.1" in small.paths[0].reason
     assert small.paths[1].path is not None
@@ -160,13 +162,15 @@ def test_a_process_that_does_not_fit_the_target_is_left_out_with_the_reason(mode
 
 def test_waypoints_off_the_reference_are_named(model):
     far = {**TAUGHT, "waypoints": [{"positions_m": [[0.25, 0.1, 0.0], [0.45, 0.1, 0.0]]}]}
-    step = ProcessTransfer(lesson({"front": [far]}), model).transfer(cloud(seed=1)).paths[0]
+    step = (
+        ProcessTransfer(bound_knowledge({"front": [far]}), model).transfer(cloud(seed=1)).paths[0]
+    )
     assert "number 2 of line 1 is 1" in step.reason and "standoff_m 0" in step.reason
 
 
 def test_regions_that_overlap_on_the_target_are_said(model):
     reference = cloud()
-    taught = lesson({"top": [SAND], "right": [SAND]}, reference, allow_overlap=True)
+    taught = bound_knowledge({"top": [SAND], "right": [SAND]}, reference, allow_overlap=True)
     both = np.union1d(taught.regions["right"], taught.regions["top"])
     changed = {**taught.regions, "right": both}
     taught = type(taught)(taught.knowledge, reference, changed)
@@ -180,7 +184,9 @@ def test_paths_are_judged_by_the_mesh_that_was_given(model):
     box = trimesh.creation.box(SIZE - 0.01)
     mesh = Mesh(np.array(box.vertices), np.array(box.faces))
     (step,) = (
-        ProcessTransfer(lesson({"top": [SAND]}), model).transfer(replace(target, mesh=mesh)).paths
+        ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
+        .transfer(replace(target, mesh=mesh))
+        .paths
     )
     assert step.measures.judged_by == "the mesh as given (12 triangles)"
     assert step.measures.surface_distance_99_m < 1e-3
@@ -196,7 +202,7 @@ def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
     deeper = target.points - [0.0, 0.004, 0.0] * (target.normals[:, 1:2] > 0.5)
     points = np.concatenate([deeper, deeper + 1e-4])
     whole = PointCloud(points, np.concatenate([target.normals] * 2))
-    teacher = ProcessTransfer(lesson({"top": [SAND]}), model)
+    teacher = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
     (step,) = teacher.transfer(target, whole=whole).paths
     assert step.measures.judged_by == f"all {2 * len(target)} points as given"
     assert step.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
@@ -215,7 +221,7 @@ def test_a_carried_step_that_grew_is_said(model, monkeypatch):
         parts = {n: getattr(first, n)[keep] for n in ("positions", "quaternions_xyzw", "normals")}
         return (replace(first, **parts), *carried[1:]), lost
 
-    teacher = ProcessTransfer(lesson({"front": [TAUGHT]}), model)
+    teacher = ProcessTransfer(bound_knowledge({"front": [TAUGHT]}), model)
     (step,) = teacher.transfer(cloud(seed=1)).paths
     assert not any("a step of" in warning for warning in step.warnings)
     monkeypatch.setattr("nrdf.process.transfer.carry", torn)
@@ -227,14 +233,16 @@ def test_a_carried_step_that_grew_is_said(model, monkeypatch):
 
 
 def test_a_model_of_another_category_is_refused(model):
-    table = lesson({"top": [SAND]}, category="table")
+    table = bound_knowledge({"top": [SAND]}, category="table")
     with pytest.raises(ModelError, match="for the category chair, but the knowledge is about"):
         ProcessTransfer(table, model)
 
 
 def test_normals_are_estimated_for_all_points_and_kept(model):
     whole = cloud(seed=1)
-    result = ProcessTransfer(lesson({"top": [SAND]}), model).transfer(PointCloud(whole.points))
+    result = ProcessTransfer(bound_knowledge({"top": [SAND]}), model).transfer(
+        PointCloud(whole.points)
+    )
     facing = np.einsum("na,na->n", result.target.normals, whole.normals)
     assert np.quantile(facing, 0.2) > 0.9
     assert result.paths[0].measures.coverage > 0.9
@@ -243,7 +251,7 @@ def test_normals_are_estimated_for_all_points_and_kept(model):
 def test_a_target_in_another_unit_is_brought_to_metres(model):
     there = cloud(seed=1)
     far = PointCloud(1000 * there.points + 5000, there.normals, unit="mm", frame="cell")
-    result = ProcessTransfer(lesson({"top": [SAND]}), model).transfer(far)
+    result = ProcessTransfer(bound_knowledge({"top": [SAND]}), model).transfer(far)
     assert (result.target.unit, result.target.frame) == ("m", "cell")
     positions = np.concatenate([s.positions for s in process_segments(result.paths[0])])
     np.testing.assert_allclose(positions[:, 1], 5 + SIZE[1] / 2, atol=5e-3)
@@ -251,11 +259,11 @@ def test_a_target_in_another_unit_is_brought_to_metres(model):
 
 def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
     write_cloud(tmp_path / "box.ply", cloud())
-    write_knowledge(tmp_path / "box.yaml", lesson({"top": [SAND]}).knowledge)
+    write_knowledge(tmp_path / "box.yaml", bound_knowledge({"top": [SAND]}).knowledge)
     teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
     nrdf.write_job(tmp_path / "job", teacher.transfer(cloud(seed=1)))
     assert (tmp_path / "job" / "report.html").exists()
-    assert teacher.lesson.knowledge.regions[0].name == "top"
+    assert teacher.bound_knowledge.knowledge.regions[0].name == "top"
 
 
 def test_points_in_use_are_found_again(model):
@@ -267,7 +275,7 @@ def test_points_in_use_are_found_again(model):
 
 def test_taught_spots_are_carried_one_by_one(model):
     spots = [{"positions_m": [[0.25, 0.1, z]]} for z in (-0.2, 0.0, 0.2)]
-    taught = lesson({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
+    taught = bound_knowledge({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
     step = ProcessTransfer(taught, model).transfer(cloud(seed=1)).paths[0]
     assert step.reason == "" and [len(s.positions) for s in process_segments(step)] == [1, 1, 1]
     assert step.measures.cycle_time_s > 6.0

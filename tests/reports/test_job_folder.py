@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import nrdf
-from builders.taught_box import SAND, cloud, lesson, made_up
+from builders.taught_box import SAND, bound_knowledge, cloud, made_up
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import read_cloud
 from nrdf.process.bound_knowledge import read_bound_knowledge
-from nrdf.process.check import check
+from nrdf.process.check import check_knowledge
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.reports.job_folder import job_of, panel_of, write_job_files
@@ -28,8 +28,8 @@ PAINT = {
 
 @pytest.fixture(scope="module")
 def transferred(untrained):
-    processes = {"top": [SAND, {**SAND, "kind": "oil", "transfer": "carry"}], "right": [PAINT]}
-    teacher = ProcessTransfer(lesson(processes), nrdf.load_model(untrained))
+    processes = {"top": [SAND, {**SAND, "kind": "oil", "transfer": "warp"}], "right": [PAINT]}
+    teacher = ProcessTransfer(bound_knowledge(processes), nrdf.load_model(untrained))
     return teacher.transfer(cloud(seed=1))
 
 
@@ -79,7 +79,7 @@ def test_processes_of_one_kind_on_one_region_keep_their_own_names(untrained, tmp
     wide = {**SAND, "stepover_mm": 45, "standoff_mm": 0, "feed_mm_s": 50}
     eats_all = {**SAND, "edge_margin_mm": 400}
     teacher = ProcessTransfer(
-        lesson({"top": [eats_all, SAND, wide, PAINT]}), nrdf.load_model(untrained)
+        bound_knowledge({"top": [eats_all, SAND, wide, PAINT]}), nrdf.load_model(untrained)
     )
     result = teacher.transfer(cloud(seed=1))
     assert [step.process.label for step in result.paths] == ["sand", "sand 2", "sand 3", "paint"]
@@ -98,10 +98,10 @@ def test_the_targets_knowledge_is_as_good_as_the_taught_one(folder, transferred)
     for name, indices in again.regions.items():
         np.testing.assert_array_equal(indices, transferred.regions[name].match.indices)
     sand, oil = again.knowledge.regions[0].processes
-    assert (sand.way, oil.way, oil.trajectory) == ("replan", "carry", "taught")
+    assert (sand.transfer_mode, oil.transfer_mode, oil.trajectory) == ("replan", "warp", "taught")
     assert again.knowledge.origin["knowledge"] == "k.yaml"
     np.testing.assert_allclose(again.cloud.normals, transferred.target.normals, atol=1e-6)
-    checked = check(again)
+    checked = check_knowledge(again)
     assert [row.fault for row in checked] == ["", "", ""]
     for row, step in zip(checked, transferred.paths, strict=True):
         assert row.measures.coverage == pytest.approx(step.measures.coverage, abs=0.03)
@@ -119,7 +119,7 @@ def test_the_page_needs_no_network_and_escapes_what_it_shows(folder):
     assert "<script" not in page and "@import" not in page and "url(" not in page
     assert page.count("data:image/png;base64,") == 1 + 3
     assert "new &amp; &lt;old&gt;" in page and "<old>" not in page and "&lt;x&gt;" in page
-    for shown in ("Limits not met", "sand", "oil", "paint", "carried from the reference", "40 mm"):
+    for shown in ("Limits not met", "sand", "oil", "paint", "warped from the reference", "40 mm"):
         assert shown in page
 
 

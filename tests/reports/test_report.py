@@ -7,7 +7,13 @@ import pytest
 
 from builders.taught_box import MEASURES, made_up
 from nrdf.process.limits import Limits
-from nrdf.reports.transfer_report import FIGURES, SHORT_FIGURES, figures, report_of, short_figures
+from nrdf.reports.transfer_report import (
+    METRIC_COLUMNS,
+    SHORT_METRIC_COLUMNS,
+    metric_cells,
+    report_of,
+    short_metric_cells,
+)
 
 
 def test_a_report_says_what_was_found_asked_and_measured():
@@ -16,7 +22,7 @@ def test_a_report_says_what_was_found_asked_and_measured():
     assert report["regions"]["top"]["found"] and report["regions"]["top"]["confidence"] == 0.8
     (path,) = report["paths"]
     assert (path["region"], path["process"], path["transfer"]) == ("top", "sand", "replan")
-    assert path["asked"]["stepover_m"] == 0.04 and path["asked"]["force_n"] == 10
+    assert path["requested"]["stepover_m"] == 0.04 and path["requested"]["force_n"] == 10
     assert path["measures"] == vars(MEASURES)
     assert (path["lines"], path["waypoints"]) == (1, 5)
     assert report["total"] == {
@@ -75,7 +81,7 @@ def test_a_doubtful_region_is_said():
 def test_what_is_skipped_has_its_reason():
     report = report_of(made_up(missing="found nowhere on the target"), Limits())
     assert not report["regions"]["top"]["found"]
-    assert report["regions"]["top"]["skipped_because"] == "found nowhere on the target"
+    assert report["regions"]["top"]["reason"] == "found nowhere on the target"
     assert not report["paths"][0]["planned"] and "measures" not in report["paths"][0]
     assert report["total"]["skipped"] == 1
     report = report_of(made_up(reason="edge_margin_m is 0.1, which ..."), Limits())
@@ -85,7 +91,7 @@ def test_what_is_skipped_has_its_reason():
 
 
 def test_figures_are_shown_as_people_read_them():
-    assert dict(zip(FIGURES, figures(vars(MEASURES)), strict=True)) == {
+    assert dict(zip(METRIC_COLUMNS, metric_cells(vars(MEASURES)), strict=True)) == {
         "worked · left out · unreached": "99.5 · 0.0 · 0.5 %",
         "overlap": "40%",
         "line spacing, mean · worst": "40.0 · 42.0 mm",
@@ -97,9 +103,9 @@ def test_figures_are_shown_as_people_read_them():
         "time": "50 s",
     }
     alone = vars(replace(MEASURES, line_spacing_worst_m=None))
-    assert short_figures(alone)[SHORT_FIGURES.index("lines, mm")] == "–"
-    assert figures(alone)[2] == "–"
-    assert dict(zip(SHORT_FIGURES, short_figures(vars(MEASURES)), strict=True)) == {
+    assert short_metric_cells(alone)[SHORT_METRIC_COLUMNS.index("lines, mm")] == "–"
+    assert metric_cells(alone)[2] == "–"
+    assert dict(zip(SHORT_METRIC_COLUMNS, short_metric_cells(vars(MEASURES)), strict=True)) == {
         "worked, %": "99.5", "left out, %": "0.0", "missed, %": "0.5", "lines, mm": "42.0",
         "step, mm": "21.0", "turn, °": "1", "off, mm": "0.6", "time, s": "50",
     }  # fmt: skip

@@ -88,7 +88,7 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
         there.transfer(desk.document, give_up)
     desk.change_numbers("top", 0, {"stepover_mm": 20.0})
     there.transfer(desk.document, silent)
-    taught = there.results["new"].transferred.lesson.knowledge.regions[0].processes[0]
+    taught = there.results["new"].transferred.bound_knowledge.knowledge.regions[0].processes[0]
     assert taught.stepover_m == 0.02, "what was changed after it was given up"
 
     write_cloud(tmp_path / "box.ply", cloud())

@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from builders.taught_box import SAND, cloud, faces, lesson
+from builders.taught_box import SAND, bound_knowledge, cloud, faces
 from nrdf.errors import ProcessError
-from nrdf.process.check import check
+from nrdf.process.check import check_knowledge
 from nrdf.surface import surface as surface_module
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
@@ -85,5 +85,5 @@ def test_the_same_is_found_in_parts(box, monkeypatch):
 
 def test_check_says_so_by_region_and_process():
     fine = {**SAND, "stepover_mm": 1e-3, "allow_unusual": True}
-    (row,) = check(lesson({"top": [fine]}))
+    (row,) = check_knowledge(bound_knowledge({"top": [fine]}))
     assert "lines would be planned" in row.fault and row.measures is None

@@ -12,7 +12,7 @@ from tyro.conf import Positional
 from nrdf.commands.console import console, errors, progress_bar, show, table
 
 if TYPE_CHECKING:
-    from nrdf.process.check import Checked
+    from nrdf.process.check import CheckedProcess
     from nrdf.process.knowledge import Process
 
 log = logging.getLogger(__name__)
@@ -91,13 +91,12 @@ def check(file: Positional[Path], model: str | None = None) -> None:
     """
     from nrdf.errors import ProcessError
     from nrdf.process.bound_knowledge import read_bound_knowledge
-    from nrdf.process.category import check_category
-    from nrdf.process.check import check as check_on_reference
+    from nrdf.process.check import check_category, check_knowledge
     from nrdf.process.knowledge_file import listed
 
     lesson = read_bound_knowledge(file)
     with progress_bar("planning on the reference") as progress:
-        checked = check_on_reference(lesson, progress)
+        checked = check_knowledge(lesson, progress)
     reference = lesson.knowledge.reference
     size = lesson.cloud.points.max(axis=0) - lesson.cloud.points.min(axis=0)
     console.print(
@@ -149,32 +148,34 @@ def schema(out: Path | None = None) -> None:
         console.print(f"wrote {out}")
 
 
-def _show_asked(checked: list[Checked]) -> None:
+def _show_asked(checked: list[CheckedProcess]) -> None:
     shown = table(
         "\nasked for", "region", "process", "trajectory", "stepover", "margin", "lead · tilt",
         "contact", "feed", texts=3,
     )  # fmt: skip
     for row in checked:
         process = row.process
-        way = "" if process.way == "replan" else ", carried"
+        mode = "" if process.transfer_mode == "replan" else ", warped"
         contact = "standoff_m" if process.standoff_m else "force_n"
         leaning = " · ".join(_said(process, name) for name in ("lead_rad", "tilt_rad"))
         lengths = ("distance_between_lines_m", "edge_margin_m")
         shown.add_row(
-            row.region, process.label, f"{process.trajectory}{way}",
+            row.region, process.label, f"{process.trajectory}{mode}",
             *(_said(process, name) for name in lengths), leaning, _said(process, contact),
             _said(process, "feed_m_s"),
         )  # fmt: skip
     show(shown)
 
 
-def _show_planned(checked: list[Checked], points: dict[str, int]) -> None:
-    from nrdf.reports.transfer_report import SHORT_FIGURES, short_figures
+def _show_planned(checked: list[CheckedProcess], points: dict[str, int]) -> None:
+    from nrdf.reports.transfer_report import SHORT_METRIC_COLUMNS, short_metric_cells
 
-    shown = table("\nplanned on the reference", "region", "points", *SHORT_FIGURES)
+    shown = table("\nplanned on the reference", "region", "points", *SHORT_METRIC_COLUMNS)
     for row in checked:
         missing = row.measures is None
-        cells = ["–"] * len(SHORT_FIGURES) if missing else short_figures(vars(row.measures))
+        cells = (
+            ["–"] * len(SHORT_METRIC_COLUMNS) if missing else short_metric_cells(vars(row.measures))
+        )
         shown.add_row(row.region, str(points[row.region]), *cells)
     show(shown)
 

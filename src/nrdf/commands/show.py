@@ -177,7 +177,7 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     seen = aligned.encode_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
-    return teacher.transfer(seen, doubts=aligned.doubts, kind=aligned.kind)
+    return teacher.transfer(seen, target_warnings=aligned.doubts, kind=aligned.kind)
 
 
 def _simulate(folder: Path) -> dict[str, Any] | None:
@@ -238,7 +238,7 @@ def _taught_panel(title: str, teacher: ProcessTransfer) -> Panel:
     lines: dict[str, list[np.ndarray]] = {}
     for region, number, _ in teacher.steps():
         lines.setdefault(region, []).extend(teacher.contacts(region, number))
-    lesson = teacher.lesson
+    lesson = teacher.bound_knowledge
     note = f"{len(lesson.regions)} regions, each with a process of its own, taught"
     return Panel(title, lesson.cloud.points, None, lesson.regions, note, lines)
 

@@ -108,7 +108,7 @@ def transfer(
         raise CloudError("--sensor and --skip are for scans: give --up")
     with output_folder(out, overwrite, [knowledge, target, *region, model]) as folder:
         import nrdf
-        from nrdf.process.bound_knowledge import files_of, read_bound_knowledge, unit_and_doubts
+        from nrdf.process.bound_knowledge import files_of, read_bound_knowledge, unit_and_warnings
         from nrdf.process.transfer import MIN_CONFIDENCE, ProcessTransfer
         from nrdf.reports.job_folder import write_job_files
 
@@ -119,7 +119,7 @@ def transfer(
         scan = None
         if up is None:
             cloud = nrdf.read_cloud(target, topic=topic)
-            known, doubts = unit_and_doubts(cloud, unit, category, str(target), "--unit")
+            known, doubts = unit_and_warnings(cloud, unit, category, str(target), "--unit")
         else:
             with errors.status("alignment"):
                 examples = stand_ins(loaded, lesson.cloud)
@@ -134,7 +134,7 @@ def transfer(
             given, said, whole = (cloud, known, None) if scan is None else _of_scan(scan, known)
             kind = None if scan is None else scan.kind
             transferred = teacher.transfer(
-                given, said, least, marked, doubts=doubts, whole=whole, kind=kind
+                given, said, least, marked, target_warnings=doubts, whole=whole, kind=kind
             )
         origin = {
             "command": command_line(),
@@ -150,7 +150,7 @@ def transfer(
     console.print(f"{_summary(report)}; all in {out}")
     if not report["total"]["paths"]:
         raise NothingFoundError(_nothing_planned(report, category, up))
-    broken, doubted = report["limits"]["not_met"], report["doubts"] if strict else []
+    broken, doubted = report["limits"]["not_met"], report["strict_warnings"] if strict else []
     if broken or doubted:
         parts = (("limits not met", broken), ("doubtful, with --strict", doubted))
         lines = [line for title, of in parts if of for line in (f"{title}:", *_indented(of))]
@@ -164,7 +164,7 @@ def _of_scan(scan: AlignedScan, unit: str) -> tuple[EncodedCloud, None, PointClo
 
 def _nothing_planned(report: dict[str, Any], category: str, up: str | None) -> str:
     """Why a transfer ends without any tool path, region by region, and what to try."""
-    reasons = {f"region '{p['region']}': {p['left_out_because']}": None for p in report["paths"]}
+    reasons = {f"region '{p['region']}': {p['reason']}": None for p in report["paths"]}
     try_ = (
         f"is this a {category}, upright (+Y up) and facing +X? For a scan in another pose try "
         "--up z (or x, y, -z, auto)"
@@ -180,13 +180,13 @@ def _indented(lines: Iterable[str]) -> list[str]:
 
 def show_transfer(report: dict[str, Any]) -> None:
     """A table of a transfer's tool paths, and its warnings."""
-    from nrdf.reports.transfer_report import SHORT_FIGURES, short_figures
+    from nrdf.reports.transfer_report import SHORT_METRIC_COLUMNS, short_metric_cells
 
-    none = ["–"] * len(SHORT_FIGURES)
-    shown = table("", "region", "process", "sure", *SHORT_FIGURES, texts=2)
+    none = ["–"] * len(SHORT_METRIC_COLUMNS)
+    shown = table("", "region", "process", "sure", *SHORT_METRIC_COLUMNS, texts=2)
     for path in report["paths"]:
         confidence = f"{report['regions'][path['region']]['confidence']:.2f}"
-        cells = short_figures(path["measures"]) if path["planned"] else none
+        cells = short_metric_cells(path["measures"]) if path["planned"] else none
         style = None if path["planned"] else "dim"
         shown.add_row(path["region"], path["process"], confidence, *cells, style=style)
     longest = max((len(path["region"]) for path in report["paths"]), default=0)

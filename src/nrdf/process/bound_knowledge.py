@@ -1,4 +1,4 @@
-"""Knowledge together with what it was taught on: the reference's cloud and the regions on it."""
+"""Process knowledge with its reference cloud loaded and its regions found on it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ from nrdf.regions.region import region_indices
 
 log = logging.getLogger(__name__)
 
-COMMON = 0.02
-"""Share of a region's points that another may have as well: borders are cut by hand."""
-_ODD_SIZE = 3.0  # times the usual size at which a unit is doubted
+_COMMON = 0.02  # share of points that two regions may share: borders are drawn by hand
+_ODD_SIZE = 3.0  # factor off the usual size from which there is a warning about the unit
 
 
 @dataclass(frozen=True)
 class BoundKnowledge:
-    """Knowledge on its reference.
+    """Knowledge with its reference cloud and regions.
 
     cloud: the reference in metres. regions: name to indices (k,) of its points, in the order of
     the knowledge's regions.
@@ -43,17 +42,19 @@ class BoundKnowledge:
 def read_bound_knowledge(path: str | Path) -> BoundKnowledge:
     """A knowledge file with its reference and regions.
 
-    Raises ProcessError as `read_knowledge` and `bind` do, and CloudError for a reference that
+    Raises ProcessError as `read_knowledge` and `resolve` do, and CloudError for a reference that
     cannot be read.
     """
     path = Path(path)
-    return bind(read_knowledge(path), path.parent, str(path))
+    return resolve(read_knowledge(path), path.parent, str(path))
 
 
-def bind(
+def resolve(
     knowledge: Knowledge, folder: str | Path = ".", origin: str = "knowledge"
 ) -> BoundKnowledge:
-    """Read a knowledge's reference and find its regions on it; file names count from `folder`.
+    """Load the reference of a knowledge and find its regions there.
+
+    File names are relative to `folder`; `origin` names the knowledge in messages.
 
     Raises ProcessError for a checksum that does not match, an unknown or contradictory unit, and,
     all in one message, for regions that are not on the reference or overlap without
@@ -76,11 +77,11 @@ def bind(
 
 
 def overlaps(regions: dict[str, np.ndarray]) -> list[str]:
-    """A line for each two regions, (k,) indices, that share more than a border's few points."""
+    """A message for each pair of regions, indices (k,), that share more than some border points."""
     lines = []
     for (one, first), (other, second) in combinations(regions.items(), 2):
         common = len(np.intersect1d(first, second, assume_unique=True))
-        if common > COMMON * min(len(first), len(second)):
+        if common > _COMMON * min(len(first), len(second)):
             lines.append(
                 f"regions '{one}' and '{other}' overlap: they share {common} of their {len(first)} "
                 f"and {len(second)} points, which would be worked twice; take them out of one, or "
@@ -90,23 +91,24 @@ def overlaps(regions: dict[str, np.ndarray]) -> list[str]:
 
 
 def known_unit(cloud: PointCloud, unit: str | None, category: str, what: str, option: str) -> str:
-    """As `unit_and_doubts`; what is doubtful is logged as warnings."""
-    known, doubts = unit_and_doubts(cloud, unit, category, what, option)
-    for doubt in doubts:
-        log.warning("%s", doubt)
+    """As `unit_and_warnings`; logs the warnings."""
+    known, warnings = unit_and_warnings(cloud, unit, category, what, option)
+    for warning in warnings:
+        log.warning("%s", warning)
     return known
 
 
-def unit_and_doubts(
+def unit_and_warnings(
     cloud: PointCloud, unit: str | None, category: str, what: str, option: str
 ) -> tuple[str, list[str]]:
-    """The unit of a cloud: the one its file gives, or `unit`, or told by its category's usual size.
+    """The unit of a cloud, and warnings about it.
 
-    `what` names the cloud and `option` the way to give a unit, in messages. Returned with what is
-    doubtful about it: a guess, a size that its category does not have. Raises ProcessError where
-    two units contradict each other, or where none is given and the size fits several or none.
+    The unit is the one that the file gives, or `unit`, or guessed from the usual size of the
+    category. There is a warning for a guess, and for a size that is unusual for the category.
+    `what` names the cloud in messages, and `option` the way to give a unit. Raises ProcessError
+    where two units contradict each other, or where none is given and the size fits several or none.
     """
-    doubts = []
+    warnings = []
     if unit is not None and cloud.unit not in (None, unit):
         raise ProcessError(f"{what}: {option} is {unit}, but the file says {cloud.unit}")
     size = float(np.ptp(cloud.points, axis=0).max())
@@ -119,13 +121,13 @@ def unit_and_doubts(
                 f"it{_usual(category)}: give {option} ({', '.join(METRES)})"
             )
         told = f"because its longest side is {size:.4g}{_usual(category)}"
-        doubts.append(f"{what} does not say its unit; taken to be {known}, {told}")
+        warnings.append(f"{what} does not say its unit; taken to be {known}, {told}")
     metres = size * METRES[known]
     low, high = USUAL_SIZES.get(category, (0.0, np.inf))
     if not low / _ODD_SIZE <= metres <= high * _ODD_SIZE:
         odd = f"{metres:.4g} m long{_usual(category)}"
-        doubts.append(f"{what} is {odd}: is its unit, {known}, right?")
-    return known, doubts
+        warnings.append(f"{what} is {odd}: is its unit, {known}, right?")
+    return known, warnings
 
 
 def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:

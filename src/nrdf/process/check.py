@@ -1,9 +1,10 @@
-"""Whether knowledge fits its reference: every process is planned there, as it will be elsewhere."""
+"""Check knowledge: plan and measure every process on the reference, and know the category."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.units import in_words
+from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
 from nrdf.process.path_warnings import measure_warnings
@@ -26,9 +28,12 @@ from nrdf.toolpath.types import Segment
 
 
 @dataclass(frozen=True)
-class Checked:
-    """A process on its region of the reference. fault: why it cannot be done, or ""; warnings:
-    what to look at; segments and measures of its tool path: none where it cannot be done."""
+class CheckedProcess:
+    """A process planned on its region of the reference.
+
+    fault: why it cannot be done, or "". warnings: what a person should look at. segments and
+    measures: of its tool path, none where it cannot be done.
+    """
 
     region: str
     process: Process
@@ -43,18 +48,20 @@ class Checked:
         return f"region '{self.region}', {self.process.label}"
 
 
-def check(
-    lesson: BoundKnowledge, progress: Callable[[int, int], None] | None = None
-) -> list[Checked]:
+def check_knowledge(
+    bound_knowledge: BoundKnowledge, progress: Callable[[int, int], None] | None = None
+) -> list[CheckedProcess]:
     """Plan and measure every process on the reference; `progress` is told (done, all)."""
     # The same points as a model would work with.
-    kept = downsample(lesson.cloud.points, WORKING_POINTS, np.random.default_rng(0))
-    cloud = lesson.cloud.select(kept)
+    kept = downsample(bound_knowledge.cloud.points, WORKING_POINTS, np.random.default_rng(0))
+    cloud = bound_knowledge.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
     surface = Surface(cloud.points, normals)
-    given = given_surface(with_normals_of(lesson.cloud, replace(cloud, normals=normals)))
-    regions = {name: np.flatnonzero(np.isin(kept, of)) for name, of in lesson.regions.items()}
-    steps = [(region.name, p) for region in lesson.knowledge.regions for p in region.steps]
+    given = given_surface(with_normals_of(bound_knowledge.cloud, replace(cloud, normals=normals)))
+    regions = {
+        name: np.flatnonzero(np.isin(kept, of)) for name, of in bound_knowledge.regions.items()
+    }
+    steps = [(region.name, p) for region in bound_knowledge.knowledge.regions for p in region.steps]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
         checked.append(check_process(surface, name, regions[name], process, given))
@@ -69,10 +76,10 @@ def check_process(
     region: np.ndarray,
     process: Process,
     given: GivenSurface | None = None,
-) -> Checked:
+) -> CheckedProcess:
     """One process planned and measured on a region, indices (k,) of the surface's points.
 
-    given: the object as the user gave it, to judge the tool path by.
+    given: the object as the user gave it, which the tool path is measured against.
     """
     warnings = []
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
@@ -94,9 +101,9 @@ def check_process(
             segments = drive(drawn, normals_under(surface, lines), strategy)
         measures = measure(surface, region, strategy, segments, given)
     except ProcessError as error:
-        return Checked(name, process, str(error), tuple(warnings))
+        return CheckedProcess(name, process, str(error), tuple(warnings))
     warnings += measure_warnings(process, measures)
-    return Checked(name, process, "", tuple(warnings), measures, tuple(segments))
+    return CheckedProcess(name, process, "", tuple(warnings), measures, tuple(segments))
 
 
 def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:
@@ -107,4 +114,35 @@ def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> No
         raise ProcessError(
             f"spacing_m is {spacing}, longer than the region, {in_words('length_m', length)}; give "
             "less, or set allow_unusual: true in the process"
+        )
+
+
+def known_categories() -> list[str]:
+    """Categories of the models in the zoo and of the parametric families."""
+    from nrdf.field.zoo import list_models
+    from nrdf.shapes.families import FAMILY_NAMES
+
+    return sorted({entry.category for entry in list_models()} | set(FAMILY_NAMES))
+
+
+def check_category(category: str, model: str | Path | None = None) -> None:
+    """Raise ProcessError, with the nearest known name, for a category without a model.
+
+    model: zoo name, weight file or run, which must be for the category; ModelError where it cannot
+    be read.
+    """
+    if model is not None:
+        from nrdf.field.weights import read_metadata
+        from nrdf.field.zoo import find_weights
+
+        found = read_metadata(find_weights(model))["category"]
+        if found != category:
+            raise ProcessError(f"category is '{category}', but the model {model} is for {found}")
+        return
+    known = known_categories()
+    if category not in known:
+        raise ProcessError(
+            f"no model for the category '{category}'{suggest_name(category, known)}. With a model "
+            "of your own give --model; if it is meant all the same, set allow_unusual: true at the "
+            "top of the file (nrdf knowledge new --allow-unusual)"
         )

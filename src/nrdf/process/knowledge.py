@@ -22,10 +22,10 @@ from nrdf.process.quantities import (
     NotNegative,
     Number,
     PlainMapping,
+    PlausibleRange,
     Positive,
     Quantities,
     Quaternion,
-    Usual,
     Vector,
     implausible,
 )
@@ -34,15 +34,15 @@ from nrdf.regions.region import region_name_fault
 VERSION: Final = 1
 Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
 Trajectory = Literal["raster", "cross-hatch", "spiral", "contour", "taught"]
-Transfer = Literal["replan", "carry"]
-_ROOM = 190  # characters of a name to which a number is added
+TransferMode = Literal["replan", "warp"]
+_LONGEST_LABEL = 190  # characters of a name to which a number is added
 WITHOUT_CONTACT = ("paint", "inspect")
 """Kinds of process that touch nothing, so have no contact force."""
 
 
-_FEED, _LENGTH = Usual(1e-4, 5.0), Usual(0.0, 1.0)
-_SPACING = Usual(1e-4, 1.0)
-_LEANING = Usual(-math.pi / 3, math.pi / 3)
+_FEED, _LENGTH = PlausibleRange(1e-4, 5.0), PlausibleRange(0.0, 1.0)
+_SPACING = PlausibleRange(1e-4, 1.0)
+_TILT = PlausibleRange(-math.pi / 3, math.pi / 3)
 
 
 def _region_name(text: str) -> str:
@@ -56,19 +56,19 @@ class Tool(Quantities):
 
     name: Name = "tool"
     """Its name, for the robot's program."""
-    radius_m: Annotated[Positive, Usual(1e-4, 0.5)]
+    radius_m: Annotated[Positive, PlausibleRange(1e-4, 0.5)]
     """Radius of its footprint on the surface."""
     clearance_m: Annotated[NotNegative, _LENGTH] = 0.0
-    """Free room that it needs before the surface, along the normal; a strategy leaves out places
-    that have less, such as crevices. 0: not looked at."""
-    tcp_m: Annotated[Vector | None, Usual(-2.0, 2.0)] = None
+    """Free space that it needs above the surface, along the normal; planned paths leave out places
+    that have less, such as crevices. 0: not checked."""
+    tcp_m: Annotated[Vector | None, PlausibleRange(-2.0, 2.0)] = None
     """Tool centre point in the robot's flange frame."""
     tcp_quaternion_xyzw: Quaternion | None = None
     """Rotation from the tool frame (z into the part) to the flange frame."""
 
 
 class FreeMove(Quantities):
-    """How a line is approached, or left."""
+    """The move to a line (approach) or away from it (retract)."""
 
     distance_m: Annotated[NotNegative, _LENGTH] = 0.05
     """Length of the move."""
@@ -78,8 +78,8 @@ class FreeMove(Quantities):
     """Its speed."""
 
 
-class Line(Quantities):
-    """A taught line (stroke): waypoints in the order in which they are driven."""
+class TaughtSegment(Quantities):
+    """A taught process segment: one line of waypoints, in the order of travel."""
 
     positions_m: Annotated[list[Vector], Field(fail_fast=True)] = Field(min_length=1)
     """Tool centre points in the reference's frame."""
@@ -88,7 +88,7 @@ class Line(Quantities):
     one a waypoint; without them the tool follows the surface, lead and tilt."""
 
     @model_validator(mode="after")
-    def _one_each(self) -> Line:
+    def _one_each(self) -> TaughtSegment:
         given = self.quaternions_xyzw
         if given is not None and len(given) != len(self.positions_m):
             raise ValueError(
@@ -107,9 +107,9 @@ class Process(Quantities):
     """What people call it ("sand, 120 grit"); needed where kind is custom."""
     order: Annotated[int, Field(ge=-(10**6), le=10**6)] = 0
     """Lower numbers first, over all regions; equal ones as they stand in the file."""
-    transfer: Transfer | None = None
-    """replan: plan the strategy anew on the new object; carry: take every waypoint over.
-    Unless given, carry where the trajectory is taught, else replan."""
+    transfer: TransferMode | None = None
+    """replan: plan the strategy anew on the new object; warp: move every waypoint by the
+    correspondence. Unless given, warp where the trajectory is taught, else replan."""
     trajectory: Trajectory = "raster"
     """raster, cross-hatch, spiral, contour, or taught with its own waypoints."""
     direction: Direction | None = None
@@ -122,31 +122,31 @@ class Process(Quantities):
     """Distance between waypoints along a line."""
     edge_margin_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Kept free inside the region's border."""
-    passes: Annotated[int, Field(ge=1, le=1000), Usual(1, 100)] = 1
+    passes: Annotated[int, Field(ge=1, le=1000), PlausibleRange(1, 100)] = 1
     """How often the region is worked."""
     tool: Tool
     """The tool."""
-    lead_rad: Annotated[Angle, _LEANING] = 0.0
-    """The tool axis leans by this against the normal, its tail towards where it travels."""
-    tilt_rad: Annotated[Angle, _LEANING] = 0.0
-    """The tool axis leans by this sideways."""
+    lead_rad: Annotated[Angle, _TILT] = 0.0
+    """Angle of the tool axis from the normal, in the direction of travel (its tail forward)."""
+    tilt_rad: Annotated[Angle, _TILT] = 0.0
+    """Angle of the tool axis from the normal, sideways."""
     standoff_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Height of the tool centre point over the surface; 0 where the tool touches it."""
-    force_n: Annotated[Positive | None, Usual(0.01, 500.0)] = None
+    force_n: Annotated[Positive | None, PlausibleRange(0.01, 500.0)] = None
     """Contact force along the tool axis; leave it out where nothing is touched."""
     force_tolerance_n: Positive | None = None
     """How far the force may be off."""
     feed_m_s: Annotated[Positive, _FEED]
     """Speed of the tool centre point along the lines."""
-    spindle_rad_s: Annotated[NotNegative | None, Usual(0.0, 100_000 * math.pi / 30)] = None
+    spindle_rad_s: Annotated[NotNegative | None, PlausibleRange(0.0, 100_000 * math.pi / 30)] = None
     """Speed of the spindle."""
-    dwell_s: Annotated[NotNegative, Usual(0.0, 3600.0)] = 0.0
+    dwell_s: Annotated[NotNegative, PlausibleRange(0.0, 3600.0)] = 0.0
     """Pause at the end of each line."""
     approach: FreeMove = FreeMove()
     """The free move to a line."""
     retract: FreeMove = FreeMove()
     """The free move away from a line."""
-    waypoints: Annotated[list[Line], Field(fail_fast=True)] | None = None
+    waypoints: Annotated[list[TaughtSegment], Field(fail_fast=True)] | None = None
     """The lines of a taught trajectory."""
     allow_unusual: bool = False
     """Whether values beyond what is plausible (a feed above 5 m/s, say) are meant."""
@@ -159,9 +159,9 @@ class Process(Quantities):
         return self.name or self.kind
 
     @property
-    def way(self) -> Transfer:
+    def transfer_mode(self) -> TransferMode:
         """How it goes to a new object."""
-        return self.transfer or ("carry" if self.trajectory == "taught" else "replan")
+        return self.transfer or ("warp" if self.trajectory == "taught" else "replan")
 
     @property
     def distance_between_lines_m(self) -> float:
@@ -208,7 +208,7 @@ class Process(Quantities):
         if self.transfer == "replan":
             raise ValueError(
                 "transfer: replan needs a strategy to plan, but trajectory is taught; "
-                "use transfer: carry"
+                "use transfer: warp"
             )
 
     def _contact_makes_sense(self, force_n: float) -> None:
@@ -259,7 +259,7 @@ class Region(Quantities):
         for process in self.processes:
             label = process.label
             if label in seen:
-                names = (f"{process.label[:_ROOM]} {k}" for k in range(2, len(taken) + 3))
+                names = (f"{process.label[:_LONGEST_LABEL]} {k}" for k in range(2, len(taken) + 3))
                 label = next(name for name in names if name not in taken)
                 process = process.model_copy(update={"name": label})
             seen.add(label)
@@ -306,7 +306,7 @@ class Reference(Quantities):
 
 
 class Knowledge(Quantities):
-    """What was taught on one object, to be carried to others of its category."""
+    """What was taught on one object, for other objects of its category."""
 
     version: Literal[1] = VERSION
     """Version of this format."""

@@ -1,4 +1,4 @@
-"""What speaks against a transfer: limits that are not met, and what is doubtful about it."""
+"""Limits on a transfer's result, and the warnings that `nrdf transfer --strict` refuses."""
 
 from __future__ import annotations
 
@@ -10,43 +10,43 @@ from nrdf.process.transfer import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
 from nrdf.toolpath.metrics import Measures
 
-DOUBTFUL = 0.4
-"""Confidence below which a region that was found should be looked at."""
-SURE = 0.9
-"""Confidence from which a region is absent beyond doubt."""
+LOW_CONFIDENCE = 0.4
+"""A region found with less confidence than this gets a warning."""
+SURELY_ABSENT = 0.9
+"""From this confidence on, an absent region gets no warning."""
 
 
-def doubts_of(transferred: TransferResult) -> list[str]:
-    """What is doubtful about a transfer: the object (pose, unit, kind), then its regions.
+def strict_warnings(result: TransferResult) -> list[str]:
+    """Warnings about the target (pose, unit, kind), then about its regions.
 
-    A region is in doubt where it was found with little confidence, and where it was skipped and is
-    not absent beyond doubt. `nrdf transfer --strict` takes none of this.
+    A region gets a warning where it was found with little confidence, and where it was skipped
+    but may be there. `nrdf transfer --strict` ends with exit code 3 where there are any.
     """
-    regions = ((n, _doubt(region)) for n, region in transferred.regions.items())
-    kind = () if transferred.kind is None else transferred.kind.warnings
-    about = dict.fromkeys((*transferred.doubts, *kind))  # an aligned scan's doubts hold its kind's
-    return [*about, *(f"region '{n}': {doubt}" for n, doubt in regions if doubt)]
+    regions = ((name, _region_warning(region)) for name, region in result.regions.items())
+    kind = () if result.kind is None else result.kind.warnings
+    # An aligned scan's own warnings already contain those about its kind.
+    about_target = dict.fromkeys((*result.target_warnings, *kind))
+    return [*about_target, *(f"region '{name}': {warning}" for name, warning in regions if warning)]
 
 
-def _doubt(region: FoundRegion) -> str:
+def _region_warning(region: FoundRegion) -> str:
     match = region.match
     if not region.missing:
-        said = f"doubtful: confidence {match.score:.2f}; look at it"
-        return said if match.score < DOUBTFUL else ""
-    absent = match.presence.reason == ABSENT and match.presence.confidence >= SURE
+        warning = f"doubtful: confidence {match.score:.2f}; look at it"
+        return warning if match.score < LOW_CONFIDENCE else ""
+    absent = match.presence.reason == ABSENT and match.presence.confidence >= SURELY_ABSENT
     known = absent or match.method == "marked"
     return "" if known else f"perhaps there all the same: {region.missing}"
 
 
 @dataclass(frozen=True)
 class Limits:
-    """None where there is no limit. SI, of each tool path; the cycle time is that of all.
+    """Limits on each tool path, in SI; None: no limit. The cycle time is that of the whole job.
 
-    any_kind: whether the target may look like something else than the knowledge's kind of object,
-    or stand otherwise; that limit is there unless it is lifted.
-
-    The coverage is that of the whole region that was found. The distance is that from the object
-    as it was given; from the surface planned on where nothing else is known.
+    min_coverage: of the whole region that was found. max_surface_distance_m: from the object as it
+    was given, or from the surface planned on where nothing else is known. require_all: every
+    process needs a tool path. any_kind: also accept a target that does not look like the
+    knowledge's kind of object, or does not stand upright and face forward.
 
     Raises ConfigError for a limit that is not finite, below 0, or a share above 1.
     """
@@ -66,18 +66,18 @@ class Limits:
             if value is not None:
                 (FRACTION if name == "min_coverage" else NON_NEGATIVE).check(name, value)
 
-    def broken(self, transferred: TransferResult) -> list[str]:
+    def broken(self, result: TransferResult) -> list[str]:
         """A line for each limit that is not met: by which region and process, and by how much."""
         lines = []
-        if transferred.kind is not None and not self.any_kind:
-            lines += [f"{w} (--any-kind: take it all the same)" for w in transferred.kind.warnings]
-        for step in transferred.paths:
+        if result.kind is not None and not self.any_kind:
+            lines += [f"{w} (--any-kind: take it all the same)" for w in result.kind.warnings]
+        for step in result.paths:
             where = f"region '{step.region}', {step.process.label}"
             if step.measures is None:
                 lines += [f"{where}: there is no tool path: {step.reason}"] * self.require_all
             else:
                 lines += [f"{where}: {what}" for what in self._broken_by(step.measures)]
-        total = sum(step.measures.cycle_time_s for step in transferred.paths if step.measures)
+        total = sum(step.measures.cycle_time_s for step in result.paths if step.measures)
         if self.max_cycle_time_s is not None and total > self.max_cycle_time_s:
             lines.append(f"the cycle time is {total:.1f} s, above {self.max_cycle_time_s:g} s")
         return lines

@@ -1,4 +1,4 @@
-"""A knowledge file to begin with: the reference, its regions, and sensible values for each kind."""
+"""New knowledge to fill in: the reference, its regions, and default values for each kind."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any, get_args
 from nrdf.errors import ProcessError, unknown_name
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
-from nrdf.process.bound_knowledge import bind, checksum, known_unit, overlaps
-from nrdf.process.category import check_category, known_categories
+from nrdf.process.bound_knowledge import checksum, known_unit, overlaps, resolve
+from nrdf.process.check import check_category, known_categories
 from nrdf.process.knowledge import Kind, Knowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.regions.files import read_regions
@@ -111,8 +111,10 @@ def new_knowledge(
     }
     knowledge = validated(content, "the new file")
     if regions:
-        lesson = bind(knowledge.model_copy(update={"allow_overlap": True}), folder, "the new file")
-        for line in overlaps(lesson.regions):
+        bound_knowledge = resolve(
+            knowledge.model_copy(update={"allow_overlap": True}), folder, "the new file"
+        )
+        for line in overlaps(bound_knowledge.regions):
             log.warning("%s", line)
     return knowledge
 

@@ -1,4 +1,4 @@
-"""Quantities in files: SI fields whose names end with their unit, and what may stand for them."""
+"""Quantities in files: SI fields named with their unit, also read in mm, degrees and rpm."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def _quaternion(q: tuple[float, float, float, float]) -> tuple[float, float, flo
 
 
 @dataclass(frozen=True)
-class Usual:
-    """From `least` to `most` a quantity is plausible; what is not has to be said to be meant."""
+class PlausibleRange:
+    """The plausible range of a quantity; a file must say that a value outside is meant."""
 
     least: float
     most: float
@@ -124,8 +124,8 @@ class Quantities(StrictModel):
         schema = handler.resolve_ref_schema(handler(core_schema))
         properties = schema.get("properties", {})
         for name in list(properties):
-            for usual in _usual(cls, name):
-                told = f"Plausible: {usual.least:.6g} to {usual.most:.6g}."
+            for plausible in _plausible_ranges(cls, name):
+                told = f"Plausible: {plausible.least:.6g} to {plausible.most:.6g}."
                 said = properties[name].get("description", "")
                 properties[name]["description"] = f"{said} {told}".strip()
             for other, factor in other_names(name).items():
@@ -139,7 +139,7 @@ class Quantities(StrictModel):
 
 
 def implausible(model: Quantities, within: str = "") -> list[str]:
-    """A line for each quantity of a model, and of those in it, that is beyond its `Usual`.
+    """A line for each quantity of a model, and of those in it, outside its plausible range.
 
     within: the model's own name and a dot, where it is in another.
     """
@@ -150,14 +150,22 @@ def implausible(model: Quantities, within: str = "") -> list[str]:
             lines += implausible(value, f"{within}{name}.")
         elif value is not None:
             numbers = value if isinstance(value, tuple) else (value,)
-            faults = (u.fault(within + name, n) for u in _usual(type(model), name) for n in numbers)
+            faults = (
+                u.fault(within + name, n)
+                for u in _plausible_ranges(type(model), name)
+                for n in numbers
+            )
             lines += [fault for fault in faults if fault][:1]
     return lines
 
 
-def _usual(model: type[Quantities], name: str) -> list[Usual]:
+def _plausible_ranges(model: type[Quantities], name: str) -> list[PlausibleRange]:
     field = model.model_fields.get(name)
-    return [] if field is None else [item for item in field.metadata if isinstance(item, Usual)]
+    return (
+        []
+        if field is None
+        else [item for item in field.metadata if isinstance(item, PlausibleRange)]
+    )
 
 
 def _scaled(schema: dict[str, Any], factor: float) -> dict[str, Any]:

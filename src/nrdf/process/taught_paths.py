@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.units import in_words
-from nrdf.process.knowledge import Line, Process
+from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions, travel_of
@@ -51,7 +51,9 @@ def taught_lines(process: Process, surface: Surface) -> tuple[TaughtLine, ...]:
     return tuple(lines)
 
 
-def _turns(line: Line, positions: np.ndarray, process: Process, surface: Surface) -> np.ndarray:
+def _turns(
+    line: TaughtSegment, positions: np.ndarray, process: Process, surface: Surface
+) -> np.ndarray:
     if line.quaternions_xyzw is not None:
         return np.array(line.quaternions_xyzw, float)
     nearest = surface.tree.query(positions)[1]

@@ -29,9 +29,9 @@ from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
-from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_doubts
+from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_warnings
 from nrdf.process.correspondence import Correspondence, TaughtSurface
-from nrdf.process.knowledge import Line, Process, Transfer
+from nrdf.process.knowledge import Process, TaughtSegment, TransferMode
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught_paths import TaughtLine, taught_lines
 from nrdf.process.warp import carry
@@ -65,15 +65,15 @@ class FoundRegion:
 class PathResult:
     """One process on one region of the target.
 
-    number: which of the region's processes, from 0. process: as it is there (its direction, or its
-    carried waypoints, in the target's frame). way: how it came. path, measures: None where there
-    is none, for the `reason`.
+    number: which of the region's processes, from 0. process: as it is on the target (its
+    direction, or its warped waypoints, in the target's frame). path, measures: None where there is
+    no tool path; `reason` says why.
     """
 
     region: str
     number: int
     process: Process
-    way: Transfer
+    transfer_mode: TransferMode
     path: ToolPath | None = None
     measures: Measures | None = None
     warnings: tuple[str, ...] = ()
@@ -85,19 +85,19 @@ class TransferResult:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
     target: with normals, estimated where its file had none. seconds: time by phase. pose: from
-    canonical coordinates to the target's: how the object lies there. doubts: what is doubtful
-    about the object's pose and unit. kind: what it looks like. What is doubtful altogether:
-    `nrdf.process.limits.doubts_of`.
+    canonical coordinates to the target's: how the object lies there. target_warnings: about the
+    target's pose and unit. kind: what it looks like. All warnings that `--strict` refuses:
+    `nrdf.process.limits.strict_warnings`.
     """
 
-    lesson: BoundKnowledge
+    bound_knowledge: BoundKnowledge
     target: PointCloud
     regions: dict[str, FoundRegion]
     paths: tuple[PathResult, ...]
     warnings: tuple[str, ...]
     seconds: dict[str, float]
     pose: Similarity | None = None
-    doubts: tuple[str, ...] = ()
+    target_warnings: tuple[str, ...] = ()
     kind: KindCheck | None = None
 
 
@@ -107,15 +107,15 @@ class ProcessTransfer:
     Raises ModelError for a model of another category.
     """
 
-    def __init__(self, lesson: BoundKnowledge, model: Model) -> None:
-        category = lesson.knowledge.category
+    def __init__(self, bound_knowledge: BoundKnowledge, model: Model) -> None:
+        category = bound_knowledge.knowledge.category
         if model.category and model.category != category:
             raise ModelError(
                 f"the model is for the category {model.category}, but the knowledge is about a "
                 f"{category}; give a model for {category}"
             )
-        self.lesson, self.model = lesson, model
-        self.taught = model.set_reference(lesson.cloud)
+        self.bound_knowledge, self.model = bound_knowledge, model
+        self.taught = model.set_reference(bound_knowledge.cloud)
         self.reference = TaughtSurface(self.taught)
         self.surface = self.reference.surface
         self._lines: dict[tuple[str, int], tuple[TaughtLine, ...]] = {}
@@ -127,7 +127,7 @@ class ProcessTransfer:
         min_confidence: float = MIN_CONFIDENCE,
         marked: Mapping[str, ArrayLike] | None = None,
         progress: Callable[[int, int], None] | None = None,
-        doubts: Sequence[str] | None = None,
+        target_warnings: Sequence[str] | None = None,
         whole: PointCloud | None = None,
         kind: KindCheck | None = None,
     ) -> TransferResult:
@@ -140,8 +140,8 @@ class ProcessTransfer:
         region there is left out with the reason. marked: regions that a person has marked on the
         target, by name, as `region_indices` takes them, points in metres; they are taken as they
         are, and a mask that is False everywhere says that the region is not there. `progress` is
-        told (done, all) steps. doubts: what is doubtful about the target's pose and unit; unless
-        given, its unit is judged here, and logged as a warning where it is doubtful. whole: the
+        told (done, all) steps. target_warnings: warnings about the target's pose and unit; unless
+        given, its unit is checked here, and warnings are logged. whole: the
         target before it was thinned, in metres, by which tool paths are judged. kind: what the
         target was found to look like; it is checked here unless given. Raises
         CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
@@ -150,21 +150,21 @@ class ProcessTransfer:
         """
         FRACTION.check("min_confidence", min_confidence)
         start = time.perf_counter()
-        doubted: Sequence[str] = ()
+        unit_warnings: Sequence[str] = ()
         if isinstance(target, EncodedCloud):
-            embedded = self.taught.facing(self.lesson.regions, target)
+            embedded = self.taught.facing(self.bound_knowledge.regions, target)
         else:
             target = as_cloud(target, "the target")
-            category = self.lesson.knowledge.category
-            known, doubted = unit_and_doubts(target, unit, category, "the target", "unit")
+            category = self.bound_knowledge.knowledge.category
+            known, unit_warnings = unit_and_warnings(target, unit, category, "the target", "unit")
             embedded = self.model.encode(in_metres(target, known))
         if kind is None:
             kind = self.taught.check_kind(embedded)
-        if doubts is None:
-            doubts = doubted
-            for doubt in (*doubted, *kind.warnings):
-                log.warning("%s", doubt)
-        matches = self.taught.retrieve_all(self.lesson.regions, embedded, check=False)
+        if target_warnings is None:
+            target_warnings = unit_warnings
+            for warning in (*unit_warnings, *kind.warnings):
+                log.warning("%s", warning)
+        matches = self.taught.retrieve_all(self.bound_knowledge.regions, embedded, check=False)
         matches |= self._marked(marked or {}, matches, embedded.cloud)
         found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
         seconds = {"regions": time.perf_counter() - start}
@@ -192,16 +192,15 @@ class ProcessTransfer:
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
         warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        made, pose, doubtful = tuple(paths), embedded.pose, tuple(doubts)
+        made, pose, about_target = tuple(paths), embedded.pose, tuple(target_warnings)
         return TransferResult(
-            self.lesson, cloud, found, made, warnings, seconds, pose, doubtful, kind
+            self.bound_knowledge, cloud, found, made, warnings, seconds, pose, about_target, kind
         )
 
     def _marked(
         self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
     ) -> dict[str, Match]:
-        """Matches of regions that a person has marked on the target: nothing about them is in
-        doubt."""
+        """Matches of regions that a person has marked on the target, with confidence 1."""
         matches = {}
         for name, region in marked.items():
             if name not in found:
@@ -219,7 +218,7 @@ class ProcessTransfer:
         """Every process with its region and number there, in the order in which they are done."""
         steps = [
             (region.name, number, process)
-            for region in self.lesson.knowledge.regions
+            for region in self.bound_knowledge.knowledge.regions
             for number, process in enumerate(region.steps)
         ]
         return sorted(steps, key=lambda step: step[2].order)
@@ -231,7 +230,7 @@ class ProcessTransfer:
             if process.waypoints is not None:
                 lines = taught_lines(process, self.surface)
             else:
-                inside = working(self.taught.reference, self.lesson.regions[region])
+                inside = working(self.taught.reference, self.bound_knowledge.regions[region])
                 once = replace(strategy_of(process), passes=1)
                 segments = plan(self.surface, inside, once)
                 lines = tuple(
@@ -248,7 +247,7 @@ class ProcessTransfer:
         return [touched(line.positions, line.quaternions_xyzw, height) for line in lines]
 
     def _process(self, region: str, number: int) -> Process:
-        named = {r.name: r for r in self.lesson.knowledge.regions}
+        named = {r.name: r for r in self.bound_knowledge.knowledge.regions}
         return named[region].processes[number]
 
     def _path(
@@ -260,17 +259,19 @@ class ProcessTransfer:
         way: Correspondence,
         given: GivenSurface,
     ) -> PathResult:
-        made = PathResult(region, number, process, process.way)
+        made = PathResult(region, number, process, process.transfer_mode)
         if found.missing:
             return replace(made, reason=found.missing)
         inside = working(way.embedded, found.match.indices)
         if process.direction is not None:
-            direction = way.direction(self.lesson.regions[region], np.array(process.direction))
+            direction = way.direction(
+                self.bound_knowledge.regions[region], np.array(process.direction)
+            )
             process = process.model_copy(update={"direction": tuple(direction.tolist())})
         strategy = strategy_of(process)
         warnings: tuple[str, ...] = ()
         try:
-            if process.way == "replan":
+            if process.transfer_mode == "replan":
                 segments = plan(way.target, inside, strategy)
             else:
                 process, segments, warnings = self._carry(region, number, process, way)
@@ -298,7 +299,9 @@ class ProcessTransfer:
         drawn = [(line.positions, line.quaternions_xyzw) for line in carried]
         normals = [line.normals for line in carried]
         segments = drive(drawn, normals, strategy_of(process))
-        waypoints = [Line(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn]
+        waypoints = [
+            TaughtSegment(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn
+        ]
         changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
         return process.model_copy(update=changes), segments, tuple(warnings)
 

@@ -46,7 +46,7 @@ def write_job(
 
 def write_job_files(
     folder: Path,
-    transferred: TransferResult,
+    result: TransferResult,
     limits: Limits,
     title: str,
     origin: Mapping[str, Any],
@@ -58,23 +58,23 @@ def write_job_files(
     `origin` (command, model, versions, ...) is added to the report. Without any tool path there is
     neither knowledge.yaml nor toolpaths.json. Raises OutputError if something cannot be written.
     """
-    target = transferred.target
+    target = result.target
     write_cloud(folder / TARGET, target)
     (folder / REGIONS).mkdir()
-    found = {n: r.match for n, r in transferred.regions.items() if not r.missing}
+    found = {n: r.match for n, r in result.regions.items() if not r.missing}
     write_matches(folder / REGIONS, target, found)
-    job = job_of(transferred)
+    job = job_of(result)
     if job.paths:
         write_toolpaths(folder, job)
-        write_knowledge(folder / KNOWLEDGE, _knowledge(transferred, folder, origin))
+        write_knowledge(folder / KNOWLEDGE, _knowledge(result, folder, origin))
     start = time.perf_counter()
-    panel = panel_of(transferred, title)
+    panel = panel_of(result, title)
     with ThreadPoolExecutor(2) as pool:
         whole = pool.submit(draw_regions, [panel], folder / PICTURE, _WHOLE)
         details = pool.submit(render_details, panel, list(panel.regions), _DETAIL).result()
         whole.result()
-    seconds = {**transferred.seconds, "pictures": time.perf_counter() - start}
-    report = {"title": title, **report_of(transferred, limits), **origin}
+    seconds = {**result.seconds, "pictures": time.perf_counter() - start}
+    report = {"title": title, **report_of(result, limits), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
     write_page(folder / PAGE, report, folder / PICTURE, details)
@@ -84,49 +84,49 @@ def write_job_files(
     return report
 
 
-def job_of(transferred: TransferResult) -> Job:
+def job_of(result: TransferResult) -> Job:
     """The tool paths of a transfer, in the order in which they are driven."""
     return Job(
-        category=transferred.lesson.knowledge.category,
-        frame=transferred.target.frame or "target",
-        paths=tuple(step.path for step in transferred.paths if step.path is not None),
-        pose=transferred.pose,
+        category=result.bound_knowledge.knowledge.category,
+        frame=result.target.frame or "target",
+        paths=tuple(step.path for step in result.paths if step.path is not None),
+        pose=result.pose,
     )
 
 
-def panel_of(transferred: TransferResult, title: str, note: str = "") -> Panel:
+def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
     """The target, upright, with its regions and the lines of its tool paths, for a picture."""
-    turn = np.eye(3) if transferred.pose is None else transferred.pose.rotation
-    regions = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
+    turn = np.eye(3) if result.pose is None else result.pose.rotation
+    regions = {n: r.match.indices for n, r in result.regions.items() if not r.missing}
     lines: dict[str, list[np.ndarray]] = {}
-    for step in transferred.paths:
+    for step in result.paths:
         if step.path is not None:
             work = [s for s in step.path.segments if s.kind == "process"]
             height = step.process.standoff_m
             drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
             lines.setdefault(step.region, []).extend(line @ turn for line in drawn)
-    target = transferred.target
+    target = result.target
     normals = None if target.normals is None else target.normals @ turn
     return Panel(title, target.points @ turn, normals, regions, note, lines)
 
 
-def _knowledge(transferred: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
+def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
     """What was taught, as it is on the target: the same format, for the same kind of use."""
-    taught = transferred.lesson.knowledge
+    taught = result.bound_knowledge.knowledge
     regions = []
     for region in taught.regions:
         # In the file's order, whatever the order in which they are driven.
         done = [
             step.process
             for number in range(len(region.processes))
-            for step in transferred.paths
+            for step in result.paths
             if (step.region, step.number) == (region.name, number) and step.path is not None
         ]
         if done:
             file = f"{REGIONS}/{region.name}.ply"
             regions.append(Region(name=region.name, file=file, processes=done))
-    found = {n: r.match.indices for n, r in transferred.regions.items() if not r.missing}
-    frame = transferred.target.frame
+    found = {n: r.match.indices for n, r in result.regions.items() if not r.missing}
+    frame = result.target.frame
     reference = Reference(cloud=TARGET, sha256=checksum(folder / TARGET), frame=frame)
     keys = ("command", "knowledge", "target", "model", "date")
     return Knowledge(

@@ -13,7 +13,7 @@ import numpy as np
 
 from nrdf.geometry.units import in_words
 from nrdf.io.atomic import write_atomically
-from nrdf.reports.transfer_report import FIGURES, figures, left_out_in_words
+from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
 from nrdf.viz.picture import region_colours
 
 _STYLE = """
@@ -51,7 +51,7 @@ dl { display: grid; grid-template-columns: auto 1fr; gap: 1px 12px; margin: 6px 
 code { font-size: 12.5px; word-break: break-word; }
 @media print { .path, .card { break-inside: avoid; } body { padding: 0; } }
 """
-_COLUMNS = ("region", "process", "confidence", *FIGURES)
+_COLUMNS = ("region", "process", "confidence", *METRIC_COLUMNS)
 
 
 def write_page(
@@ -145,12 +145,13 @@ def _table(report: Mapping[str, Any], colours: Mapping[str, str]) -> str:
             f"<td>{confidence:.2f}</td>"
         )
         if not path["planned"]:
-            why = escape(path["left_out_because"] or "")
+            why = escape(path["reason"] or "")
+            span = len(METRIC_COLUMNS)
             rows.append(
-                f'<tr class="none">{first}<td class="text" colspan="{len(FIGURES)}">{why}</td></tr>'
+                f'<tr class="none">{first}<td class="text" colspan="{span}">{why}</td></tr>'
             )
             continue
-        cells = "".join(f"<td>{cell}</td>" for cell in figures(path["measures"]))
+        cells = "".join(f"<td>{cell}</td>" for cell in metric_cells(path["measures"]))
         rows.append(f"<tr>{first}{cells}</tr>")
     table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
     return f'<div class="wide"><table>{table}</table></div>'
@@ -175,19 +176,19 @@ def _details(
 
 def _said(path: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What a path is, by name and value, as people read it."""
-    asked = path["asked"]
-    tool = asked["tool"]
+    requested = path["requested"]
+    tool = requested["tool"]
 
     def quantity(name: str) -> str:
-        return in_words(name, asked[name]) if asked.get(name) is not None else "–"
+        return in_words(name, requested[name]) if requested.get(name) is not None else "–"
 
-    way = "planned anew" if path["transfer"] == "replan" else "carried from the reference"
-    direction = asked.get("direction")
+    way = "planned anew" if path["transfer"] == "replan" else "warped from the reference"
+    direction = requested.get("direction")
     lines = [
-        ("trajectory", f"{asked['trajectory']}, {way}"),
+        ("trajectory", f"{requested['trajectory']}, {way}"),
         ("lines, waypoints", f"{path['lines']}, {path['waypoints']}"),
         ("stepover, spacing", f"{quantity('stepover_m')}, {quantity('spacing_m')}"),
-        ("edge margin, passes", f"{quantity('edge_margin_m')}, {asked['passes']}"),
+        ("edge margin, passes", f"{quantity('edge_margin_m')}, {requested['passes']}"),
         ("tool, radius", f"{tool['name']}, {in_words('radius_m', tool['radius_m'])}"),
         ("lead, tilt, stand-off",
          f"{quantity('lead_rad')}, {quantity('tilt_rad')}, {quantity('standoff_m')}"),
@@ -197,7 +198,7 @@ def _said(path: Mapping[str, Any]) -> list[tuple[str, str]]:
     lines.append(("left out of the region", left_out_in_words(measures["left_out"])))
     if measures["judged_by"] is not None:
         lines.append(("judged by", measures["judged_by"]))
-    if asked.get("spindle_rad_s") is not None:
+    if requested.get("spindle_rad_s") is not None:
         lines.append(("spindle", quantity("spindle_rad_s")))
     if direction is not None:
         lines.insert(1, ("direction", " ".join(f"{x:+.2f}" for x in direction)))

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from nrdf.process.knowledge import Process
-from nrdf.process.limits import Limits, doubts_of
+from nrdf.process.limits import Limits, strict_warnings
 from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.transfer import PathResult, TransferResult
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.metrics import REASONS
 
-FIGURES = (
+METRIC_COLUMNS = (
     "worked · left out · unreached", "overlap", "line spacing, mean · worst",
     "largest step · turn · turn by mm", "off the object, 95 % · worst",
     "off the planned surface, 99 % · worst", "axis off, 99 %", "length", "time",
 )  # fmt: skip
-SHORT_FIGURES = (
+SHORT_METRIC_COLUMNS = (
     "worked, %", "left out, %", "missed, %", "lines, mm", "step, mm", "turn, °", "off, mm",
     "time, s",
 )  # fmt: skip
@@ -27,52 +27,52 @@ SHORT_FIGURES = (
 waypoints; the distance from the object as given, 95th percentile."""
 
 
-def report_of(transferred: TransferResult, limits: Limits) -> dict[str, Any]:
+def report_of(result: TransferResult, limits: Limits) -> dict[str, Any]:
     """Everything of a transfer that a report says, as plain values; lengths in metres."""
-    regions = transferred.regions
-    paths = [_path(step, bool(regions[step.region].missing)) for step in transferred.paths]
-    driven = [step.measures for step in transferred.paths if step.measures is not None]
-    doubts = doubts_of(transferred)
+    regions = result.regions
+    paths = [_path(step, bool(regions[step.region].missing)) for step in result.paths]
+    driven = [step.measures for step in result.paths if step.measures is not None]
+    strict = strict_warnings(result)
     # A skipped region is warned about as such.
     skipped = tuple(f"region '{name}':" for name, r in regions.items() if r.missing)
-    warnings = [doubt for doubt in doubts if not doubt.startswith(skipped)]
-    warnings += transferred.warnings
+    warnings = [line for line in strict if not line.startswith(skipped)]
+    warnings += result.warnings
     for step in paths:
         if step["warnings"]:
             said = "; ".join(step["warnings"])
             warnings.append(f"region '{step['region']}', {step['process']}: {said}")
     return {
-        "category": transferred.lesson.knowledge.category,
+        "category": result.bound_knowledge.knowledge.category,
         "unit": "m",
-        "frame": transferred.target.frame,
-        "pose": pose_to_dict(transferred.pose),
-        "regions": _regions(transferred),
+        "frame": result.target.frame,
+        "pose": pose_to_dict(result.pose),
+        "regions": _regions(result),
         "paths": paths,
         "total": {
             "paths": len(driven),
-            "skipped": len(transferred.paths) - len(driven),
+            "skipped": len(result.paths) - len(driven),
             "path_length_m": sum(m.path_length_m for m in driven),
             "process_length_m": sum(m.process_length_m for m in driven),
             "cycle_time_s": sum(m.cycle_time_s for m in driven),
         },
         "warnings": warnings,
-        "doubts": doubts,
-        "kind": None if transferred.kind is None else transferred.kind.describe(),
+        "strict_warnings": strict,
+        "kind": None if result.kind is None else result.kind.describe(),
         "limits": {
             "set": {k: v for k, v in vars(limits).items() if v not in (None, False)},
-            "not_met": limits.broken(transferred),
+            "not_met": limits.broken(result),
         },
     }
 
 
-def _regions(transferred: TransferResult) -> dict[str, Any]:
-    reference, target = transferred.lesson, transferred.target
+def _regions(result: TransferResult) -> dict[str, Any]:
+    reference, target = result.bound_knowledge, result.target
     regions = {}
-    for name, region in transferred.regions.items():
+    for name, region in result.regions.items():
         match = region.match
         regions[name] = {
             "found": not region.missing,
-            "skipped_because": region.missing or None,
+            "reason": region.missing or None,
             "confidence": round(match.score, 4),
             "points": len(match.indices),
             "share_of_target": round(len(match.indices) / len(target), 5),
@@ -90,10 +90,10 @@ def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
         "number": step.number,
         "process": process.label,
         "kind": process.kind,
-        "transfer": step.way,
+        "transfer": step.transfer_mode,
         "planned": step.path is not None,
-        "left_out_because": step.reason or None,
-        "asked": _asked(process),
+        "reason": step.reason or None,
+        "requested": _requested(process),
         "warnings": [*step.warnings],
     }
     if step.path is not None and step.measures is not None:
@@ -107,7 +107,7 @@ def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
     return content
 
 
-def _asked(process: Process) -> dict[str, Any]:
+def _requested(process: Process) -> dict[str, Any]:
     """What the process asks for, apart from waypoints."""
     content = process.model_dump(mode="json", exclude_none=True, exclude={"waypoints", "name"})
     content["stepover_m"] = process.distance_between_lines_m
@@ -133,8 +133,8 @@ def jump_in_words(measures: Mapping[str, Any]) -> str:
     return f"{_millimetres(measures['step_worst_m'])} · {turn}"
 
 
-def figures(measures: Mapping[str, Any]) -> list[str]:
-    """A tool path's measures as people read them, one for each of `FIGURES`."""
+def metric_cells(measures: Mapping[str, Any]) -> list[str]:
+    """A tool path's measures as people read them, one for each of `METRIC_COLUMNS`."""
     length, time = f"{measures['process_length_m']:.2f} m", f"{measures['cycle_time_s']:.0f} s"
     spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
     true = _millimetres(measures["true_distance_95_m"], measures["true_distance_worst_m"])
@@ -146,8 +146,8 @@ def figures(measures: Mapping[str, Any]) -> list[str]:
     return [shares, overlap, spacing, jump, true, away, axis, length, time]
 
 
-def short_figures(measures: Mapping[str, Any]) -> list[str]:
-    """The measures that a terminal has room for, one for each of `SHORT_FIGURES`."""
+def short_metric_cells(measures: Mapping[str, Any]) -> list[str]:
+    """The measures that a terminal has room for, one for each of `SHORT_METRIC_COLUMNS`."""
     shares = shares_in_words(measures).removesuffix(" %").split(" · ")
     lengths = ("line_spacing_worst_m", "step_worst_m", "true_distance_95_m")
     spacing, step, off = (_millimetres(measures[name]).removesuffix(" mm") for name in lengths)

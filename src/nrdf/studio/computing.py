@@ -18,7 +18,7 @@ import numpy as np
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
-from nrdf.process.check import Checked, check_process
+from nrdf.process.check import CheckedProcess, check_process
 from nrdf.process.transfer import ProcessTransfer, TransferResult, touched
 from nrdf.studio.document import Document, Loaded, Painted
 from nrdf.studio.paintable_cloud import Body
@@ -44,7 +44,7 @@ class Plan:
     wrong."""
 
     fault: str
-    checked: Checked | None = None
+    checked: CheckedProcess | None = None
 
     @property
     def lines(self) -> list[np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.io.cloud import PointCloud
-from nrdf.process.limits import DOUBTFUL
+from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.transfer import TransferResult
 from nrdf.studio.computing import (
     Computing,
@@ -35,7 +35,7 @@ class Result:
     def doubtful(self) -> list[str]:
         """Regions that a person should look at: skipped, or found with little confidence."""
         regions = self.transferred.regions.values()
-        return [r.name for r in regions if r.missing or r.match.score < DOUBTFUL]
+        return [r.name for r in regions if r.missing or r.match.score < LOW_CONFIDENCE]
 
 
 class Bench:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.units import OTHER_UNITS, to_si
-from nrdf.process.bound_knowledge import BoundKnowledge, bind, checksum, overlaps
+from nrdf.process.bound_knowledge import BoundKnowledge, checksum, overlaps, resolve
 from nrdf.process.knowledge import Knowledge, Process, Trajectory
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
@@ -91,14 +91,14 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
 
 def lesson_of(clouds: Path, document: Document) -> BoundKnowledge:
     """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
-    as `knowledge_of` and `nrdf.process.bound_knowledge.bind` do."""
+    as `knowledge_of` and `nrdf.process.bound_knowledge.resolve` do."""
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
     for line in [] if document.allow_overlap else overlaps(regions):
         raise ProcessError(
             f"{line.partition(';')[0]}; erase those points, which are dark, from one of them in "
             "step 2, or tick 'Regions may overlap' there"
         )
-    return bind(knowledge_of(clouds, document), clouds, ORIGIN)
+    return resolve(knowledge_of(clouds, document), clouds, ORIGIN)
 
 
 def _content(

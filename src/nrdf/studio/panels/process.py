@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nrdf.process.new_knowledge import KINDS
-from nrdf.reports.transfer_report import short_figures
+from nrdf.reports.transfer_report import short_metric_cells
 from nrdf.studio.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class ProcessTab:
         if plan.fault or plan.checked is None or plan.checked.measures is None:
             return f"⚠ {_labelled(plan.fault)}"
         measures = plan.checked.measures
-        worked, left_out, missed, widest, step, turn, off, _ = short_figures(vars(measures))
+        worked, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(measures))
         minutes, seconds = divmod(round(measures.cycle_time_s), 60)
         lines = [
             f"**{measures.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nrdf.errors import NrdfError
 from nrdf.geometry.units import METRES
-from nrdf.process.limits import DOUBTFUL, Limits
+from nrdf.process.limits import LOW_CONFIDENCE, Limits
 from nrdf.reports.transfer_report import report_of, shares_in_words
 from nrdf.studio.colours import COLOURINGS
 from nrdf.studio.panels.object import AS_IN_FILE, unit_of
@@ -73,7 +73,7 @@ class TargetsTab:
         for path in report["paths"]:
             region = report["regions"][path["region"]]
             confidence = region["confidence"]
-            doubted = not region["found"] or confidence < DOUBTFUL
+            doubted = not region["found"] or confidence < LOW_CONFIDENCE
             covered = shares_in_words(path["measures"]) if path["planned"] else "–"
             flag = "⚠ " if doubted else ""
             rows.append(

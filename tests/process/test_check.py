@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builders.taught_box import SAND, cloud, lesson
+from builders.taught_box import SAND, bound_knowledge, cloud
 from nrdf.io.cloud import PointCloud
-from nrdf.process.check import check
+from nrdf.process.check import check_knowledge
 
 
 def checked(reference=None, name="top", **changes):
-    (row,) = check(lesson({name: [{**SAND, **changes}]}, reference))
+    (row,) = check_knowledge(bound_knowledge({name: [{**SAND, **changes}]}, reference))
     return row
 
 
@@ -46,7 +46,7 @@ def test_what_cannot_be_done_is_said_by_field_and_value(change, message):
 )
 def test_what_can_be_done_but_is_doubtful_is_said(change, message):
     given = {key: value for key, value in {**SAND, **change}.items() if value is not None}
-    (row,) = check(lesson({"top": [given]}))
+    (row,) = check_knowledge(bound_knowledge({"top": [given]}))
     assert any(message in line for line in row.warnings) and row.fault == ""
 
 
@@ -67,8 +67,8 @@ def test_taught_lines_are_measured_as_they_are():
 def test_a_reference_without_normals_will_do_and_progress_is_told():
     told = []
     bare = PointCloud(cloud().points, unit="m")
-    taught = lesson({"top": [SAND, SAND]})
-    rows = check(
+    taught = bound_knowledge({"top": [SAND, SAND]})
+    rows = check_knowledge(
         type(taught)(taught.knowledge, bare, taught.regions), lambda *now: told.append(now)
     )
     assert [row.fault for row in rows] == ["", ""] and told == [(1, 2), (2, 2)]

@@ -20,7 +20,7 @@ FRONT = np.flatnonzero(NORMALS[:, 0] > 0.5)
 
 @pytest.fixture
 def teach(tmp_path):
-    """Write a reference, whose file says `file_unit`, and knowledge; read the lesson."""
+    """Write a reference, whose file says `file_unit`, and knowledge; read the bound_knowledge."""
 
     def read(regions=None, file_unit="m", scale=1.0, frame=None, embed=False, changes=(), **rest):
         cloud = PointCloud(POINTS * scale, NORMALS, file_unit, frame)
@@ -51,38 +51,38 @@ def test_a_region_may_be_given_in_every_form(teach, tmp_path):
         {"file": "top.ply"},
     )
     for form in forms:
-        lesson = teach({"top": form})
-        np.testing.assert_array_equal(lesson.regions["top"], TOP)
+        bound_knowledge = teach({"top": form})
+        np.testing.assert_array_equal(bound_knowledge.regions["top"], TOP)
 
 
 def test_the_reference_is_brought_to_metres_and_its_regions_with_it(teach, tmp_path):
     write_cloud(tmp_path / "same.ply", PointCloud(1000 * POINTS[TOP]))
     write_cloud(tmp_path / "other.ply", PointCloud(100 * POINTS[TOP], unit="cm"))
     regions = {"same": {"file": "same.ply"}, "metres": {"points_m": POINTS[FRONT].tolist()}}
-    lesson = teach(regions, file_unit="mm", scale=1000, frame="cell")
-    np.testing.assert_allclose(lesson.cloud.points, POINTS, atol=1e-12)
-    assert (lesson.cloud.unit, lesson.cloud.frame) == ("m", "cell")
-    np.testing.assert_array_equal(lesson.regions["same"], TOP)
-    np.testing.assert_array_equal(lesson.regions["metres"], FRONT)
+    bound_knowledge = teach(regions, file_unit="mm", scale=1000, frame="cell")
+    np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
+    assert (bound_knowledge.cloud.unit, bound_knowledge.cloud.frame) == ("m", "cell")
+    np.testing.assert_array_equal(bound_knowledge.regions["same"], TOP)
+    np.testing.assert_array_equal(bound_knowledge.regions["metres"], FRONT)
     other = teach({"other": {"file": "other.ply"}}, file_unit="mm", scale=1000)
     np.testing.assert_array_equal(other.regions["other"], TOP)
 
 
 def test_an_embedded_reference(teach):
-    lesson = teach(embed=True, frame=None)
-    np.testing.assert_allclose(lesson.cloud.points, POINTS)
-    np.testing.assert_allclose(lesson.cloud.normals, NORMALS)
+    bound_knowledge = teach(embed=True, frame=None)
+    np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS)
+    np.testing.assert_allclose(bound_knowledge.cloud.normals, NORMALS)
     half = (0.5 * NORMALS).tolist()
     with pytest.raises(CloudError, match=r"reference.normals must have length 1"):
         teach(embed=True, normals=half)
 
 
 def test_a_unit_that_is_not_said_is_given_or_guessed_and_said(teach, caplog):
-    lesson = teach(file_unit=None, scale=1000, unit="mm")
-    np.testing.assert_allclose(lesson.cloud.points, POINTS, atol=1e-12)
+    bound_knowledge = teach(file_unit=None, scale=1000, unit="mm")
+    np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
     assert not caplog.records
-    lesson = teach(file_unit=None, scale=1000)
-    np.testing.assert_allclose(lesson.cloud.points, POINTS, atol=1e-12)
+    bound_knowledge = teach(file_unit=None, scale=1000)
+    np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
     assert "does not say its unit; taken to be mm, because its longest side is 900" in caplog.text
     with pytest.raises(ProcessError, match=r"give reference.unit \(m, cm, mm, in\)"):
         teach(file_unit=None, scale=7)
@@ -120,8 +120,8 @@ def test_overlapping_regions_are_refused_unless_wanted(teach):
         teach(regions)
     said = f"they share 100 of their {len(TOP)} and {len(both)} points"
     assert "regions 'top' and 'front' overlap: " + said in str(caught.value)
-    lesson = teach(regions, changes={"allow_overlap": True})
-    np.testing.assert_array_equal(lesson.regions["front"], both)
+    bound_knowledge = teach(regions, changes={"allow_overlap": True})
+    np.testing.assert_array_equal(bound_knowledge.regions["front"], both)
     # A border's few points may be in both.
     few = np.union1d(TOP[:2], FRONT)
     teach({"top": {"indices": TOP.tolist()}, "front": {"indices": few.tolist()}})

@@ -6,10 +6,9 @@ import pytest
 from builders.taught_box import cloud, faces
 from nrdf.errors import ProcessError, RegionError
 from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.process import category
+from nrdf.process import check
 from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
-from nrdf.process.category import check_category
-from nrdf.process.check import check
+from nrdf.process.check import check_category, check_knowledge
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
 from nrdf.process.new_knowledge import KINDS, PLACEHOLDER, new_knowledge
 
@@ -37,14 +36,14 @@ def test_a_new_file_passes_the_check_once_its_placeholder_is_filled_in(files):
     with pytest.raises(ProcessError, match=rf"region '{PLACEHOLDER}': cannot read .*{PLACEHOLDER}"):
         read_bound_knowledge(path)
     (files / "top.ply").rename(files / f"{PLACEHOLDER}.ply")
-    (row,) = check(read_bound_knowledge(path))
+    (row,) = check_knowledge(read_bound_knowledge(path))
     assert row.fault == "" and row.measures.coverage > 0.9
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_values_that_make_sense(files, kind):
     write_knowledge(files / "box.yaml", new(files, "top", kinds=[kind]), explained=True)
-    (row,) = check(read_bound_knowledge(files / "box.yaml"))
+    (row,) = check_knowledge(read_bound_knowledge(files / "box.yaml"))
     assert row.process.kind == kind and row.fault == ""
     assert not [line for line in row.warnings if "force_n" in line or "stripes" in line]
 
@@ -107,7 +106,7 @@ def test_a_category_that_no_model_is_for_is_offered_the_nearest(files, untrained
 
 
 def test_a_category_of_ones_own_is_right_where_a_model_is_given(files, untrained, monkeypatch):
-    monkeypatch.setattr(category, "known_categories", lambda: ["car"])
+    monkeypatch.setattr(check, "known_categories", lambda: ["car"])
     check_category("chair", untrained)
     with pytest.raises(ProcessError, match="known: car"):
         check_category("chair")
