@@ -20,7 +20,8 @@ from nrdf.field.zoo import WEIGHTS
 from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.families import get_family
-from nrdf.training.data import ShapeDataset, seeded
+from nrdf.training.batch import seeded
+from nrdf.training.dataset import ShapeDataset
 from nrdf.training.losses import LOSSES, LossContext
 from nrdf_benchmark.ablation import OMITTED, describe
 from nrdf_benchmark.bsrc import Benchmark
@@ -116,19 +117,19 @@ def score(
 
 
 @torch.no_grad()
-def validation_losses(field: Field, bank: ShapeDataset) -> dict[str, float]:
-    """The omitted losses by their variants' names, on undeformed shapes of a bank, the same draw
-    every time: whether a variant still does well at what it was not trained for.
+def validation_losses(field: Field, dataset: ShapeDataset) -> dict[str, float]:
+    """The omitted losses by their variants' names, on undeformed shapes, the same draw every
+    time: whether a variant still does well at what it was not trained for.
 
     The clouds have 512 points. Empty where no two shapes can be paired.
     """
     sums = dict.fromkeys(OMITTED, 0.0)
-    pools = bank.plain().values()
+    pools = dataset.plain().values()
     for pool in pools:
-        size = min(VALIDATION_BATCH, *(len(members) for _, _, members in pool.pools))
+        size = min(VALIDATION_BATCH, *(len(of.members) for of in pool.pools))
         for step in range(VALIDATION_STEPS):
             batch = pool.batch(size, seed=0, step=step)
-            forward = LossContext(field, batch, seeded(bank.device, step), VALIDATION_POINTS)
+            forward = LossContext(field, batch, seeded(dataset.device, step), VALIDATION_POINTS)
             for variant, loss in OMITTED.items():
                 sums[variant] += float(LOSSES[loss](forward))
     return {name: value / (VALIDATION_STEPS * len(pools)) for name, value in sums.items() if pools}

@@ -230,14 +230,15 @@ def _retrieval_speed(
 
 def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]:
     from nrdf.field.device import choose_device, choose_precision
+    from nrdf.training.batch import seeded
     from nrdf.training.config import load_config
-    from nrdf.training.data import ShapeDataset, seeded
+    from nrdf.training.dataset import ShapeDataset
     from nrdf.training.loop import Objective, make_optimizer, select_parts
 
     config = load_config(preset)
     chosen = choose_device(device)
     largest = max(stage.batch_size for stage in config.stages)
-    bank = ShapeDataset(_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen)
+    dataset = ShapeDataset(_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen)
     precision = choose_precision(config.precision, chosen)
     field = build_field(config.preset, config.field).to(chosen)
     speeds = []
@@ -249,7 +250,7 @@ def _training_speed(preset: str, device: str, steps: int) -> list[TrainingSpeed]
         seconds, points = [], 0
         for step in range(steps + 1):
             clock.lap()
-            batch = bank.batch(stage.batch_size, number, step)
+            batch = dataset.batch(stage.batch_size, number, step)
             total, _ = objective(batch, seeded(chosen, number, step))
             optimizer.zero_grad(set_to_none=True)
             total.backward()

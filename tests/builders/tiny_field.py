@@ -11,7 +11,7 @@ from torch import nn
 from nrdf.field.base import Field, FieldConfig, Inverse
 from nrdf.shapes.dataset import Correspondence, IndexRow, Shape, write_index, write_shape
 from nrdf.training.config import TrainConfig, load_config
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 
 
 class TinyConfig(FieldConfig):
@@ -162,5 +162,5 @@ def tiny_config(**changes) -> TrainConfig:
     return load_config({**content, **changes})
 
 
-def bank(shapes=None, **changes) -> ShapeDataset:
+def tiny_dataset(shapes=None, **changes) -> ShapeDataset:
     return ShapeDataset(shapes or balls(), tiny_config().data.model_copy(update=changes))

@@ -15,7 +15,7 @@ from builders.bsrc_folder import member_clouds, write_bsrc
 from builders.tiny_field import TinyField, balls, tiny_config
 from nrdf.errors import DataError
 from nrdf.shapes.families import get_family
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 from nrdf_benchmark import ablation_table
 from nrdf_benchmark.ablation import OMITTED
 from nrdf_benchmark.ablation_table import (
@@ -86,10 +86,10 @@ def test_scores_on_bsrc_are_those_of_the_evaluation_and_are_kept(tmp_path, untra
 def test_validation_losses_are_the_losses_on_unseen_shapes():
     torch.manual_seed(0)
     field = TinyField().eval()
-    bank = ShapeDataset(balls(2), tiny_config().data)
-    found = validation_losses(field, bank)
-    assert list(found) == list(OMITTED) and found == validation_losses(field, bank)
-    pool = next(iter(bank.plain().values()))
+    dataset = ShapeDataset(balls(2), tiny_config().data)
+    found = validation_losses(field, dataset)
+    assert list(found) == list(OMITTED) and found == validation_losses(field, dataset)
+    pool = next(iter(dataset.plain().values()))
     chamfers = []
     for step in range(ablation_table.VALIDATION_STEPS):
         batch = pool.batch(2, seed=0, step=step)

@@ -2,7 +2,7 @@
 
 import torch
 
-from builders.tiny_field import Ball, balls, bank
+from builders.tiny_field import Ball, balls, tiny_dataset
 from nrdf.training.config import AugmentConfig
 from nrdf.training.cuts import draw_cuts
 
@@ -29,7 +29,7 @@ def test_every_cut_leaves_one_end_of_an_axis():
 
 
 def test_what_is_left_fills_its_own_box():
-    batch = bank(balls(count=2000), augment=CUT, surface_points=2000, encoder_points=2000)
+    batch = tiny_dataset(balls(count=2000), augment=CUT, surface_points=2000, encoder_points=2000)
     batch = batch.batch(4, 0, 0)
     longest = (batch.clean_points.amax(1) - batch.clean_points.amin(1)).amax(1)
     assert torch.allclose(longest, torch.ones(4), atol=1e-4)
@@ -41,7 +41,7 @@ def test_places_are_asked_of_what_is_left_and_known_to_be_gone_where_it_is_cut()
     shapes = [Ball(f"b{i}", groups=("template-00",)) for i in range(4)]
     gone, there = 0, 0
     for step in range(8):
-        batch = bank(shapes, augment=CUT, rolls=3).batch(4, 0, step)
+        batch = tiny_dataset(shapes, augment=CUT, rolls=3).batch(4, 0, step)
         asked = batch.known | (batch.weight > 0)
         low, high = batch.clean_points.amin(1), batch.clean_points.amax(1)
         slack = 0.1  # of the sampled surfaces' boxes
@@ -57,7 +57,7 @@ def test_places_are_asked_of_what_is_left_and_known_to_be_gone_where_it_is_cut()
 
 
 def test_nothing_is_inside_where_it_is_cut_off():
-    found = bank(balls(count=3000), augment=CUT, queries=400)
+    found = tiny_dataset(balls(count=3000), augment=CUT, queries=400)
     batch = found.batch(4, 0, 1)
     low, high = batch.clean_points.amin(1), batch.clean_points.amax(1)
     beyond = ((batch.queries < low[:, None] - 0.02) | (batch.queries > high[:, None] + 0.02)).any(

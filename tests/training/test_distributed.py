@@ -13,7 +13,7 @@ from torch.nn.parallel import DistributedDataParallel
 from builders.tiny_field import TinyField, balls, tiny_config
 from nrdf.field import PRESETS
 from nrdf.training.checkpoint import latest_checkpoint
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.loop import Objective, run_stages
 
@@ -43,20 +43,20 @@ def one_of_two(rank: int, port: int, folder: str) -> None:
         }
 
     with join_workers("cpu") as workers:
-        bank = ShapeDataset(balls(8), config.data)
+        dataset = ShapeDataset(balls(8), config.data)
         torch.manual_seed(0)
         objective = Objective(TinyField(), config.stages[0], config, torch.float32)
         shared = DistributedDataParallel(objective, find_unused_parameters=True)
         for name, module in (("own", objective), ("shared", shared)):
             objective.zero_grad()
-            batch = bank.batch(2, 0, 0, workers.rank, workers.world)
+            batch = dataset.batch(2, 0, 0, workers.rank, workers.world)
             module(batch, torch.Generator())[0].backward()
             seen[name] = gradients(objective.field)
         seen["points"] = batch.points
         if workers.first:
             out.mkdir()
         workers.wait()
-        field, _ = run_stages(config, bank, out, workers, None)
+        field, _ = run_stages(config, dataset, out, workers, None)
         seen["weights"] = field.state_dict()
         torch.save(seen, Path(folder) / f"{rank}.pt")
 

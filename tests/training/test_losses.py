@@ -11,7 +11,7 @@ import torch
 from builders.tiny_field import TinyField, balls, tiny_config
 from nrdf.field.base import Inverse
 from nrdf.training import losses
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 from nrdf.training.losses import LOSSES, LossContext
 
 

@@ -7,7 +7,7 @@ import torch
 from builders.tiny_field import balls, tiny_config
 from nrdf.training.augment import draw_sample
 from nrdf.training.config import AugmentConfig
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 from nrdf.training.views import DIRECTIONS, draw_views, view_bits, visible_extremes
 
 VIEWS = AugmentConfig(views=1.0)
@@ -72,14 +72,15 @@ def test_extremes_are_those_of_the_visible_points():
     assert torch.equal(kept[3:].diagonal(), part.max(0).values)
 
 
-def bank(augment: AugmentConfig, **changes) -> ShapeDataset:
+def tiny_dataset(augment: AugmentConfig, **changes) -> ShapeDataset:
     changes = {"surface_points": 2000, "encoder_points": 400, "augment": augment, **changes}
     return ShapeDataset(balls(6, count=2000), tiny_config().data.model_copy(update=changes))
 
 
 def test_a_batch_shows_parts_of_shapes_in_the_frame_of_the_whole():
     whole, part = (
-        bank(augment, correspondences=400).batch(4, 0, 0) for augment in (AugmentConfig(), VIEWS)
+        tiny_dataset(augment, correspondences=400).batch(4, 0, 0)
+        for augment in (AugmentConfig(), VIEWS)
     )
     extent = [(b.points.amax(1) - b.points.amin(1)).prod(1) for b in (whole, part)]
     assert (extent[1] < extent[0] + 1e-6).all() and (extent[1] < 0.9 * extent[0]).any()
@@ -91,7 +92,7 @@ def test_a_batch_shows_parts_of_shapes_in_the_frame_of_the_whole():
 
 
 def test_an_error_of_the_frame_moves_everything_alike():
-    batch = bank(AugmentConfig(views=1.0, view_frame=0.1), queries=500).batch(4, 0, 0)
+    batch = tiny_dataset(AugmentConfig(views=1.0, view_frame=0.1), queries=500).batch(4, 0, 0)
     assert (batch.target.amax(1) - batch.target.amin(1)).amax(1).sub(1).abs().max() > 0.05
     # The surface that the moved points lie on still tells queries inside from outside.
     seen = batch.clean_points
@@ -104,6 +105,6 @@ def test_an_error_of_the_frame_moves_everything_alike():
 
 
 def test_validation_sees_whole_shapes():
-    for plain in bank(VIEWS).plain().values():
+    for plain in tiny_dataset(VIEWS).plain().values():
         batch = plain.batch(4, 0, 0)
         assert ((batch.points.amax(1) - batch.points.amin(1)).amax(1) > 0.97).all()

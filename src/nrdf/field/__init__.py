@@ -1,9 +1,14 @@
-"""The network: presets by name, one interface for all of them (`nrdf.field.base.Field`)."""
+"""The network of one category: shape embedding, descriptor field and inverse descriptor function.
+
+In: a point cloud of any unit and density (`CloudEncoder`), or the name of a preset
+(`build_field`). Out: an `EncodedCloud`, its points' descriptors, and where these belong on others.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any
 
 from pydantic import ValidationError
@@ -11,26 +16,34 @@ from pydantic import ValidationError
 from nrdf.errors import ConfigError, unknown_name
 from nrdf.field.base import Field, Inverse
 
-__all__ = ["PRESETS", "Field", "Inverse", "build_field", "field_class"]
+__all__ = ["PRESETS", "PRESET_GROUP", "Field", "Inverse", "build_field", "field_class"]
 
 PRESETS: dict[str, str] = {
     "default": "nrdf.field.default:DefaultField",
     "paper": "nrdf.field.paper:PaperField",
-    "ndf": "nrdf_benchmark.presets.ndf:NDFField",
-    "imdc": "nrdf_benchmark.presets.imdc:IMDCField",
 }
-"""Preset name to "module:class"; modules are imported when their preset is first built."""
+"""Own presets: name to "module:class"; modules are imported when their preset is first built."""
+PRESET_GROUP = "nrdf.presets"
+"""Entry points by which other packages add presets, under names that `PRESETS` does not have."""
 
 
 def field_class(preset: str) -> type[Field]:
-    """The class behind a preset name.
+    """The class behind a preset's name: one of `PRESETS`, or an installed package's entry point.
 
-    Raises ConfigError for a name that is not in `PRESETS`.
+    Raises ConfigError for an unknown name (listing the known ones), and for a package's preset that
+    cannot be imported.
     """
-    if preset not in PRESETS:
-        raise ConfigError(unknown_name("preset", preset, sorted(PRESETS)))
-    module, _, name = PRESETS[preset].partition(":")
-    return getattr(import_module(module), name)
+    if preset in PRESETS:
+        module, _, name = PRESETS[preset].partition(":")
+        return getattr(import_module(module), name)
+    others = {point.name: point for point in entry_points(group=PRESET_GROUP)}
+    if preset not in others:
+        raise ConfigError(unknown_name("preset", preset, sorted({*PRESETS, *others})))
+    try:
+        return others[preset].load()
+    except (ImportError, AttributeError) as error:
+        where = others[preset].value
+        raise ConfigError(f"preset '{preset}' cannot be loaded from {where}: {error}") from None
 
 
 def build_field(preset: str, config: Mapping[str, Any] | None = None) -> Field:

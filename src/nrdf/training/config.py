@@ -12,6 +12,7 @@ from nrdf.errors import ConfigError
 from nrdf.io.files import read_file
 from nrdf.io.schema import StrictModel, suggest_name, validation_messages
 from nrdf.io.yaml_json import read_yaml
+from nrdf.training.losses import LOSSES
 
 
 class AugmentConfig(StrictModel):
@@ -92,8 +93,6 @@ class Stage(StrictModel):
     @field_validator("weights")
     @classmethod
     def _known_losses(cls, weights: dict[str, float]) -> dict[str, float]:
-        from nrdf.training.losses import LOSSES
-
         for name in weights:
             if name not in LOSSES:
                 raise ValueError(f"no loss '{name}'{suggest_name(name, LOSSES)}")

@@ -23,6 +23,7 @@ from nrdf.field.base import Field
 from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
 from nrdf.io.locks import write_lock
+from nrdf.training.batch import Batch, seeded
 from nrdf.training.checkpoint import (
     Position,
     common_checkpoint,
@@ -35,7 +36,7 @@ from nrdf.training.checkpoint import (
     write_identity,
 )
 from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
-from nrdf.training.data import Batch, ShapeDataset, load_bank, seeded
+from nrdf.training.dataset import ShapeDataset, load_dataset
 from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
@@ -72,20 +73,19 @@ def train(
     out = Path(out)
     with join_workers(device) as workers, write_lock(out) if workers.first else nullcontext():
         entries = list_shapes([Path(folder) for folder in data])
-        bank = load_bank(entries, "train", config.data, workers.device)
-        if bank.categories != {category}:
-            raise DataError(
-                f"the shapes are of category {', '.join(sorted(bank.categories))}, not {category}"
-            )
+        dataset = load_dataset(entries, "train", config.data, workers.device)
+        if dataset.categories != {category}:
+            found = ", ".join(sorted(dataset.categories))
+            raise DataError(f"the shapes are of category {found}, not {category}")
         validation = None
         if workers.first and any(entry.split == "val" for entry in entries):
-            validation = load_bank(entries, "val", config.data, workers.device)
-        identity = run_identity(config, category, bank.names)
+            validation = load_dataset(entries, "val", config.data, workers.device)
+        identity = run_identity(config, category, dataset.names)
         shared = None if begin is None else common_checkpoint(Path(begin), identity)
         if workers.first and not open_run(out, identity, overwrite):
             write_identity(out, identity, environment(workers))
         workers.wait()
-        field, scores = run_stages(config, bank, out, workers, validation, shared)
+        field, scores = run_stages(config, dataset, out, workers, validation, shared)
         path = out / "weights.safetensors"
         if workers.first:
             save_weights(
@@ -112,7 +112,7 @@ def run_identity(config: TrainConfig, category: str, shapes: Sequence[str]) -> d
 
 def run_stages(
     config: TrainConfig,
-    bank: ShapeDataset,
+    dataset: ShapeDataset,
     out: Path,
     workers: Workers,
     validation: ShapeDataset | None,
@@ -124,7 +124,8 @@ def run_stages(
     field = build_field(config.preset, config.field).to(workers.device)
     check_parts(config, field)
     lengths = [
-        stage_steps(stage, bank.with_pools(stage.pools), workers.world) for stage in config.stages
+        stage_steps(stage, dataset.with_pools(stage.pools), workers.world)
+        for stage in config.stages
     ]
     precision = choose_precision(config.precision, workers.device)
 
@@ -145,7 +146,7 @@ def run_stages(
                 continue
             if position.stage < number:
                 position, checkpoint = Position(number, 0, position.total), None
-            pooled = bank.with_pools(stage.pools)
+            pooled = dataset.with_pools(stage.pools)
             parameters = select_parts(field, stage)
             optimizer = make_optimizer(parameters, stage, config.optimizer)
             if checkpoint is not None:
@@ -237,12 +238,12 @@ class Objective(nn.Module):
         }
 
 
-def stage_steps(stage: Stage, bank: ShapeDataset, world: int) -> int:
+def stage_steps(stage: Stage, dataset: ShapeDataset, world: int) -> int:
     """How many steps a stage has."""
     if stage.steps is not None:
         return stage.steps
     assert stage.epochs is not None
-    return max(1, round(stage.epochs * bank.steps_per_epoch(stage.batch_size, world)))
+    return max(1, round(stage.epochs * dataset.steps_per_epoch(stage.batch_size, world)))
 
 
 def learning_rate(stage: Stage, step: int, length: int) -> float:

@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.field.base import Field, Inverse
-from nrdf.training.data import Batch
+from nrdf.training.batch import Batch
 from nrdf.training.matching import (
     assign,
     distances,

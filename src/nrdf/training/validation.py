@@ -7,14 +7,14 @@ from collections import defaultdict
 import torch
 
 from nrdf.field.base import Field
-from nrdf.training.data import ShapeDataset
+from nrdf.training.dataset import ShapeDataset
 
 STEPS = 8
 BATCH = 8
 
 
 @torch.no_grad()
-def validate(field: Field, bank: ShapeDataset) -> dict[str, float]:
+def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
     """Scores on undeformed shapes, the same draw every time.
 
     `val/error`: mean distance between predicted and known corresponding points (canonical
@@ -25,7 +25,7 @@ def validate(field: Field, bank: ShapeDataset) -> dict[str, float]:
     """
     training = {module: module.training for module in field.modules()}
     field.eval()
-    sums = {pattern: _sums(field, pool) for pattern, pool in bank.plain().items()}
+    sums = {pattern: _sums(field, pool) for pattern, pool in dataset.plain().items()}
     for module, mode in training.items():
         module.training = mode
     every: dict[str, float] = defaultdict(float)
@@ -47,7 +47,7 @@ def validate(field: Field, bank: ShapeDataset) -> dict[str, float]:
 def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
     """Numerators and denominators of the scores over one pool."""
     sums: dict[str, float] = defaultdict(float)
-    size = min(BATCH, max(len(members) for _, _, members in pool.pools))
+    size = min(BATCH, max(len(of.members) for of in pool.pools))
     for step in range(STEPS):
         batch = pool.batch(size, seed=0, step=step)
         z = field.embed(batch.points, batch.normals)

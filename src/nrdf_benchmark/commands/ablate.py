@@ -62,7 +62,7 @@ def ablate(
     import nrdf
     from nrdf.field.device import choose_device
     from nrdf.training.config import load_config
-    from nrdf.training.data import load_bank
+    from nrdf.training.dataset import load_dataset
     from nrdf.training.provenance import git_commit, list_shapes
     from nrdf_benchmark import ablation, ablation_table
     from nrdf_benchmark.bsrc import read_bsrc
@@ -84,7 +84,7 @@ def ablate(
     )
     entries = list_shapes(data)
     unseen = any(entry.split == "val" for entry in entries)
-    bank = load_bank(entries, "val", settings.data, chosen) if unseen else None
+    dataset = load_dataset(entries, "val", settings.data, chosen) if unseen else None
     results = []
     for variant, run in runs.items():
         model = nrdf.load_model(run, str(chosen))
@@ -95,7 +95,7 @@ def ablate(
                 regions = ablation_table.benchmark_scores(
                     benchmark, run, str(chosen), cores, lambda _, *counts: progress(*counts)
                 )
-        validation = ablation_table.validation_losses(model.field, bank) if bank else {}
+        validation = ablation_table.validation_losses(model.field, dataset) if dataset else {}
         seconds = ablation.read_cost(run)
         results.append(
             ablation_table.VariantResult(variant, regions, validation, seconds, model.metadata)
