@@ -6,10 +6,10 @@ python examples/05_transfer_a_process.py
 import nrdf
 from nrdf.bundled import KNOWLEDGE, bundled_chair
 
-teacher = nrdf.teach(KNOWLEDGE)  # chair.yaml: five regions of a reference, a process on each
+process = nrdf.load_process(KNOWLEDGE)  # chair.yaml: five regions of a reference, a process on each
 target, _ = bundled_chair("rocker")  # PointCloud, 8192 points in metres
 
-result = teacher.transfer(target)  # finds the regions, plans or carries the tool paths
+result = process.transfer(target)  # finds the regions, plans or warps the tool paths
 for step in result.paths:  # in the order in which they are driven
     if step.path is None:
         print(f"{step.region:11s} {step.process.label:15s} left out: {step.reason}")

@@ -4,8 +4,8 @@
     taught = model.set_reference(nrdf.read_cloud("reference.ply"))
     match = taught.retrieve(region, "target.ply")  # or an array (n, 3), a mesh, ...
 
-    teacher = nrdf.teach("chair.yaml")  # process knowledge: regions, and what is done on them
-    result = teacher.transfer("target.ply")
+    process = nrdf.load_process("chair.yaml")  # process knowledge: regions and their processes
+    result = process.transfer("target.ply")
     nrdf.write_job("job/", result)  # tool paths, report and pictures
 
 Everything is imported when it is first used, so `import nrdf` is cheap.
@@ -17,8 +17,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from nrdf.errors import (
         CloudError,
         ConfigError,
@@ -35,7 +33,7 @@ if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
     from nrdf.io.inputs import as_cloud
     from nrdf.process.knowledge import Knowledge
-    from nrdf.process.transfer import ProcessTransfer, TransferResult
+    from nrdf.process.transfer import ProcessTransfer, TransferResult, load_process
     from nrdf.regions.match import Match
     from nrdf.regions.model import Model, load_model
     from nrdf.regions.reference import EncodedReference
@@ -65,8 +63,8 @@ __all__ = [
     "align",
     "as_cloud",
     "load_model",
+    "load_process",
     "read_cloud",
-    "teach",
     "write_cloud",
     "write_job",
 ]
@@ -79,28 +77,12 @@ _HOMES = {
     "Match": "nrdf.regions.match",
     **dict.fromkeys(("Model", "load_model"), "nrdf.regions.model"),
     "EncodedReference": "nrdf.regions.reference",
-    **dict.fromkeys(("ProcessTransfer", "TransferResult"), "nrdf.process.transfer"),
+    **dict.fromkeys(("ProcessTransfer", "TransferResult", "load_process"), "nrdf.process.transfer"),
     "Knowledge": "nrdf.process.knowledge",
     "align": "nrdf.scans.target",
     "write_job": "nrdf.reports.job_folder",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }
-
-
-def teach(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
-    """Process knowledge from its file, on its reference, ready to be transferred to targets.
-
-    `model` is the knowledge's category in the zoo unless given. Raises ProcessError for knowledge
-    that is wrong somewhere, naming field and value, CloudError for a reference that cannot be used,
-    and ModelError for a model of another category.
-    """
-    from nrdf.process.bound_knowledge import read_bound_knowledge
-    from nrdf.process.transfer import ProcessTransfer
-
-    bound_knowledge = read_bound_knowledge(knowledge)
-    return ProcessTransfer(
-        bound_knowledge, load_model(bound_knowledge.knowledge.category) if model is None else model
-    )
 
 
 def __getattr__(name: str) -> Any:

@@ -19,8 +19,8 @@ FRONT = np.flatnonzero(NORMALS[:, 0] > 0.5)
 
 
 @pytest.fixture
-def teach(tmp_path):
-    """Write a reference, whose file says `file_unit`, and knowledge; read the bound_knowledge."""
+def bind_file(tmp_path):
+    """Write a reference, whose file says `file_unit`, and knowledge; resolve it."""
 
     def read(regions=None, file_unit="m", scale=1.0, frame=None, embed=False, changes=(), **rest):
         cloud = PointCloud(POINTS * scale, NORMALS, file_unit, frame)
@@ -36,7 +36,7 @@ def teach(tmp_path):
     return read
 
 
-def test_a_region_may_be_given_in_every_form(teach, tmp_path):
+def test_a_region_may_be_given_in_every_form(bind_file, tmp_path):
     mask = np.zeros(len(POINTS), bool)
     mask[TOP] = True
     np.save(tmp_path / "mask.npy", mask)
@@ -51,83 +51,83 @@ def test_a_region_may_be_given_in_every_form(teach, tmp_path):
         {"file": "top.ply"},
     )
     for form in forms:
-        bound_knowledge = teach({"top": form})
+        bound_knowledge = bind_file({"top": form})
         np.testing.assert_array_equal(bound_knowledge.regions["top"], TOP)
 
 
-def test_the_reference_is_brought_to_metres_and_its_regions_with_it(teach, tmp_path):
+def test_the_reference_is_brought_to_metres_and_its_regions_with_it(bind_file, tmp_path):
     write_cloud(tmp_path / "same.ply", PointCloud(1000 * POINTS[TOP]))
     write_cloud(tmp_path / "other.ply", PointCloud(100 * POINTS[TOP], unit="cm"))
     regions = {"same": {"file": "same.ply"}, "metres": {"points_m": POINTS[FRONT].tolist()}}
-    bound_knowledge = teach(regions, file_unit="mm", scale=1000, frame="cell")
+    bound_knowledge = bind_file(regions, file_unit="mm", scale=1000, frame="cell")
     np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
     assert (bound_knowledge.cloud.unit, bound_knowledge.cloud.frame) == ("m", "cell")
     np.testing.assert_array_equal(bound_knowledge.regions["same"], TOP)
     np.testing.assert_array_equal(bound_knowledge.regions["metres"], FRONT)
-    other = teach({"other": {"file": "other.ply"}}, file_unit="mm", scale=1000)
+    other = bind_file({"other": {"file": "other.ply"}}, file_unit="mm", scale=1000)
     np.testing.assert_array_equal(other.regions["other"], TOP)
 
 
-def test_an_embedded_reference(teach):
-    bound_knowledge = teach(embed=True, frame=None)
+def test_an_embedded_reference(bind_file):
+    bound_knowledge = bind_file(embed=True, frame=None)
     np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS)
     np.testing.assert_allclose(bound_knowledge.cloud.normals, NORMALS)
     half = (0.5 * NORMALS).tolist()
     with pytest.raises(CloudError, match=r"reference.normals must have length 1"):
-        teach(embed=True, normals=half)
+        bind_file(embed=True, normals=half)
 
 
-def test_a_unit_that_is_not_said_is_given_or_guessed_and_said(teach, caplog):
-    bound_knowledge = teach(file_unit=None, scale=1000, unit="mm")
+def test_a_unit_that_is_not_said_is_given_or_guessed_and_said(bind_file, caplog):
+    bound_knowledge = bind_file(file_unit=None, scale=1000, unit="mm")
     np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
     assert not caplog.records
-    bound_knowledge = teach(file_unit=None, scale=1000)
+    bound_knowledge = bind_file(file_unit=None, scale=1000)
     np.testing.assert_allclose(bound_knowledge.cloud.points, POINTS, atol=1e-12)
     assert "does not say its unit; taken to be mm, because its longest side is 900" in caplog.text
     with pytest.raises(ProcessError, match=r"give reference.unit \(m, cm, mm, in\)"):
-        teach(file_unit=None, scale=7)
+        bind_file(file_unit=None, scale=7)
 
 
-def test_a_wrong_unit_is_noticed(teach, caplog):
+def test_a_wrong_unit_is_noticed(bind_file, caplog):
     with pytest.raises(ProcessError, match=r"reference.unit is mm, but the file says m"):
-        teach(unit="mm")
-    teach(scale=1000)
+        bind_file(unit="mm")
+    bind_file(scale=1000)
     assert "is 900 m long (a chair is usually 0.4 to 1.6 m long): is its unit, m," in caplog.text
 
 
-def test_a_checksum_that_does_not_match_is_refused(teach, tmp_path):
-    teach()
+def test_a_checksum_that_does_not_match_is_refused(bind_file, tmp_path):
+    bind_file()
     right = checksum(tmp_path / "ref.ply")
-    teach(sha256=right)
+    bind_file(sha256=right)
     with pytest.raises(ProcessError) as caught:
-        teach(scale=1.001, sha256=right)
+        bind_file(scale=1.001, sha256=right)
     assert f"reference.sha256 is {right[:12]}…, but that of" in str(caught.value)
     assert checksum(tmp_path / "ref.ply") in str(caught.value)
 
 
-def test_a_frame_comes_from_the_file_or_from_the_knowledge(teach):
+def test_a_frame_comes_from_the_file_or_from_the_knowledge(bind_file):
     base = {"reference": {"cloud": "ref.ply", "frame": "base"}}
-    assert teach(frame="cell").cloud.frame == "cell"
-    assert teach(changes=base).cloud.frame == "base"
+    assert bind_file(frame="cell").cloud.frame == "cell"
+    assert bind_file(changes=base).cloud.frame == "base"
     with pytest.raises(ProcessError, match=r"reference.frame is base, but .* says cell"):
-        teach(frame="cell", changes=base)
+        bind_file(frame="cell", changes=base)
 
 
-def test_overlapping_regions_are_refused_unless_wanted(teach):
+def test_overlapping_regions_are_refused_unless_wanted(bind_file):
     both = np.union1d(TOP[:100], FRONT)
     regions = {"top": {"indices": TOP.tolist()}, "front": {"indices": both.tolist()}}
     with pytest.raises(ProcessError) as caught:
-        teach(regions)
+        bind_file(regions)
     said = f"they share 100 of their {len(TOP)} and {len(both)} points"
     assert "regions 'top' and 'front' overlap: " + said in str(caught.value)
-    bound_knowledge = teach(regions, changes={"allow_overlap": True})
+    bound_knowledge = bind_file(regions, changes={"allow_overlap": True})
     np.testing.assert_array_equal(bound_knowledge.regions["front"], both)
     # A border's few points may be in both.
     few = np.union1d(TOP[:2], FRONT)
-    teach({"top": {"indices": TOP.tolist()}, "front": {"indices": few.tolist()}})
+    bind_file({"top": {"indices": TOP.tolist()}, "front": {"indices": few.tolist()}})
 
 
-def test_every_wrong_region_is_listed(teach, tmp_path):
+def test_every_wrong_region_is_listed(bind_file, tmp_path):
     np.savez(tmp_path / "several.npz", a=TOP, b=FRONT)
     regions = {
         "far": {"points_m": (POINTS[:9] + 1).tolist()},
@@ -137,7 +137,7 @@ def test_every_wrong_region_is_listed(teach, tmp_path):
         "seat": {"file": "several.npz"},
     }
     with pytest.raises(ProcessError) as caught:
-        teach(regions)
+        bind_file(regions)
     said = str(caught.value)
     for part in (
         "5 faults",
@@ -150,6 +150,6 @@ def test_every_wrong_region_is_listed(teach, tmp_path):
         assert part in said
 
 
-def test_a_reference_that_is_not_there(teach):
+def test_a_reference_that_is_not_there(bind_file):
     with pytest.raises(CloudError, match=r"cannot read .*gone.ply"):
-        teach(changes={"reference": {"cloud": "gone.ply"}})
+        bind_file(changes={"reference": {"cloud": "gone.ply"}})

@@ -260,10 +260,10 @@ def test_a_target_in_another_unit_is_brought_to_metres(model):
 def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
     write_cloud(tmp_path / "box.ply", cloud())
     write_knowledge(tmp_path / "box.yaml", bound_knowledge({"top": [SAND]}).knowledge)
-    teacher = nrdf.teach(tmp_path / "box.yaml", nrdf.load_model(untrained))
-    nrdf.write_job(tmp_path / "job", teacher.transfer(cloud(seed=1)))
+    process = nrdf.load_process(tmp_path / "box.yaml", nrdf.load_model(untrained))
+    nrdf.write_job(tmp_path / "job", process.transfer(cloud(seed=1)))
     assert (tmp_path / "job" / "report.html").exists()
-    assert teacher.bound_knowledge.knowledge.regions[0].name == "top"
+    assert process.bound_knowledge.knowledge.regions[0].name == "top"
 
 
 def test_points_in_use_are_found_again(model):

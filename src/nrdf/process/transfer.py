@@ -3,8 +3,8 @@
 A `ProcessTransfer` is knowledge on its reference, embedded once; `transfer` takes any number of
 targets.
 
-    teacher = nrdf.teach("chair.yaml")
-    result = teacher.transfer(nrdf.read_cloud("new.ply"))
+    process = nrdf.load_process("chair.yaml")
+    result = process.transfer(nrdf.read_cloud("new.ply"))
     nrdf.write_job("job/", result)
 """
 
@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,14 +30,19 @@ from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
-from nrdf.process.bound_knowledge import BoundKnowledge, overlaps, unit_and_warnings
+from nrdf.process.bound_knowledge import (
+    BoundKnowledge,
+    overlaps,
+    read_bound_knowledge,
+    unit_and_warnings,
+)
 from nrdf.process.correspondence import Correspondence, TaughtSurface
 from nrdf.process.knowledge import Process, TaughtSegment, TransferMode
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught_paths import TaughtLine, taught_lines
 from nrdf.process.warp import carry
 from nrdf.regions.match import Match
-from nrdf.regions.model import Model
+from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind import KindCheck
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
@@ -304,6 +310,18 @@ class ProcessTransfer:
         ]
         changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
         return process.model_copy(update=changes), segments, tuple(warnings)
+
+
+def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
+    """Process knowledge from its file, on its reference, ready to be transferred to targets.
+
+    `model` is the knowledge's category in the zoo unless given. Raises ProcessError for knowledge
+    that is wrong somewhere, naming field and value, CloudError for a reference that cannot be used,
+    and ModelError for a model of another category.
+    """
+    bound_knowledge = read_bound_knowledge(knowledge)
+    category = bound_knowledge.knowledge.category
+    return ProcessTransfer(bound_knowledge, load_model(category) if model is None else model)
 
 
 def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
