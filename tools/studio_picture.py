@@ -19,9 +19,10 @@ import nrdf
 from nrdf.bundled import KNOWLEDGE, REFERENCE, TARGETS
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.studio.app import Studio
+from nrdf.studio.model.computing import LocalComputing
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.uploads import bundled
 from nrdf.studio.serving import open_server
-from nrdf.studio.session import Session
-from nrdf.studio.uploads import bundled
 
 DOCS = Path(__file__).parents[1] / "docs"
 FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
@@ -33,9 +34,9 @@ def main() -> None:
     """Set the studio up, open it and take the pictures."""
     server = open_server("127.0.0.1", 8490)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
-        studio = Studio(Session(folder), server, nrdf.load_model, ["chair"], {})
-        studio.desk.open_lesson(REFERENCE, read_bound_knowledge(KNOWLEDGE))
-        studio.desk.add_target(TARGETS[2], bundled(TARGETS[2]))
+        studio = Studio(Session(folder), server, LocalComputing(nrdf.load_model), ["chair"], {})
+        studio.editor.open_knowledge(REFERENCE, read_bound_knowledge(KNOWLEDGE))
+        studio.editor.add_target(TARGETS[2], bundled(TARGETS[2]))
         studio.restore()
         studio.worker.wait(300)
         browser = playwright.chromium.launch(executable_path=sys.argv[1], args=list(FLAGS))
@@ -50,12 +51,12 @@ def main() -> None:
         time.sleep(5)
         page.screenshot(path=DOCS / "studio.png")
         page.get_by_role("tab", name="6 Robot").click()
-        studio.trial.start(TARGETS[2])
-        studio.trial.worker.wait(900)
-        playback = studio.trial.playback
+        studio.arm_simulation.start(TARGETS[2])
+        studio.arm_simulation.worker.wait(900)
+        playback = studio.arm_simulation.playback
         assert playback is not None, "the simulation failed"
         at_work = playback.times[playback.doing == "process"]
-        studio.trial.seek(float(at_work[len(at_work) // 3]))
+        studio.arm_simulation.seek(float(at_work[len(at_work) // 3]))
         studio.panel.refresh()
         time.sleep(5)
         page.screenshot(path=DOCS / "studio-arm.png")

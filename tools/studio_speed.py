@@ -16,12 +16,13 @@ import numpy as np
 import nrdf
 from nrdf.bundled import REFERENCE as CHAIR
 from nrdf.bundled import TARGETS, bundled_chair
-from nrdf.studio.drawing import colours_of
-from nrdf.studio.editor import Desk
-from nrdf.studio.paintable_cloud import REFERENCE
-from nrdf.studio.result_cache import Bench
-from nrdf.studio.session import Session
-from nrdf.studio.uploads import bundled
+from nrdf.studio.model.computing import LocalComputing
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.uploads import bundled
+from nrdf.studio.scene.drawing import colours_of
 
 TIMES = 5
 
@@ -37,39 +38,38 @@ def took(work: Callable[[], object], times: int = TIMES) -> float:
 
 
 def main() -> None:
-    """Print a line for each figure."""
+    """Print a line for each object_view."""
     truth = bundled_chair(CHAIR)[1]
     with tempfile.TemporaryDirectory() as folder:
-        desk = Desk(Session(folder))
-        desk.open_reference(CHAIR, bundled(CHAIR), "chair")
+        editor = Editor(Session(folder))
+        editor.open_reference(CHAIR, bundled(CHAIR), "chair")
         for name, kind in (("seat", "sand"), ("back-front", "polish")):
-            desk.add_region(name)
-            desk.paint(REFERENCE, name, truth[name])
-            desk.restart_step(name, 0, kind)
-        desk.add_target(TARGETS[0], bundled(TARGETS[0]))
-        bench = Bench(desk, nrdf.load_model)
-        body = desk.body(REFERENCE)
+            editor.add_region(name)
+            editor.paint(REFERENCE, name, truth[name])
+            editor.restart_step(name, 0, kind)
+        editor.add_target(TARGETS[0], bundled(TARGETS[0]))
+        results = ResultCache(editor, LocalComputing(nrdf.load_model))
+        body = editor.paintable(REFERENCE)
         middle = int(np.flatnonzero(truth["seat"])[0])
 
         def grow() -> None:
-            desk.paint(REFERENCE, "seat", truth["seat"] | body.canvas.patch(middle, 0.2))
-            colours_of(desk, bench, REFERENCE)
+            editor.paint(REFERENCE, "seat", truth["seat"] | body.canvas.patch(middle, 0.2))
+            colours_of(editor, results, REFERENCE)
 
         def plan() -> None:
-            bench.make_plans(desk.document, silent)
+            results.make_plans(editor.document, silent)
 
         grow()
         print(f"a click of Grow, 0.2 m, its colours and the saved session: {took(grow):.4f} s")
-        desk.paint(REFERENCE, "seat", truth["seat"])
+        editor.paint(REFERENCE, "seat", truth["seat"])
         print(f"plans on a seat and a backrest: {took(plan, 1):.2f} s")
-        bench.model("chair")
-        document = desk.document
-        spent = took(lambda: bench.transfer(document, silent), 1)
+        document = editor.document
+        spent = took(lambda: results.transfer(document, silent), 1)
         print(f"both on {TARGETS[0]}, regions and tool paths: {spent:.2f} s")
-        spent = took(lambda: bench.described(document, silent), 1)
-        described = bench.described(document, silent)
+        spent = took(lambda: results.described(document, silent), 1)
+        described = results.described(document, silent)
         print(f"likeness, the first place on two objects: {spent:.2f} s")
-        spent = took(lambda: described.unlike(middle))
+        spent = took(lambda: described.distances(middle))
         print(f"likeness, each place that the cursor goes on to: {spent:.4f} s")
 
 

@@ -14,28 +14,28 @@ from hypothesis import strategies as st
 from builders.fuzzing import altered, damaged, outcome_of, tries
 from builders.taught_box import SIZE, cloud, faces
 from nrdf.errors import NrdfError
-from nrdf.studio.colours import painted_colours
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.editor import Desk
-from nrdf.studio.session import Session
-from nrdf.studio.session_file import FILE
-from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.session_file import FILE
+from nrdf.studio.model.teaching import bound_knowledge_of, process_of, shown_numbers
+from nrdf.studio.scene.colours import painted_colours
 
 
 @pytest.fixture(scope="module")
 def valid(tmp_path_factory):
     """A session's folder, and what its file holds."""
     folder = tmp_path_factory.mktemp("valid") / "session"
-    desk = Desk(Session(folder))
-    desk.open_reference("box.ply", cloud(count=400), "chair")
+    editor = Editor(Session(folder))
+    editor.open_reference("box.ply", cloud(count=400), "chair")
     for name, kind in (("top", "sand"), ("front", "paint")):
-        desk.add_region(name)
+        editor.add_region(name)
         mask = np.zeros(400, bool)
         mask[faces(cloud(count=400))[name][:20]] = True
-        desk.paint(REFERENCE, name, mask)
-        desk.restart_step(name, 0, kind)
-    desk.add_target("new.ply", cloud(1.1 * SIZE, 300, 1))
-    desk.paint("new", "top", np.arange(300) < 12)
+        editor.paint(REFERENCE, name, mask)
+        editor.restart_step(name, 0, kind)
+    editor.add_target("new.ply", cloud(1.1 * SIZE, 300, 1))
+    editor.paint("new", "top", np.arange(300) < 12)
     return folder, json.loads((folder / FILE).read_text())
 
 
@@ -52,18 +52,18 @@ def opened(valid, folder, text):
         assert (folder / "damaged-1" / FILE).read_bytes() == text
         assert len(list((folder / "damaged-1" / "clouds").iterdir())) == 2
         return
-    desk = Desk(session)
-    for key in desk.objects():
-        body = desk.body(key)
-        painted = [(r.colour, np.flatnonzero(desk.mask(key, r.name)), None)
-                   for r in desk.document.regions]  # fmt: skip
+    editor = Editor(session)
+    for key in editor.object_keys():
+        body = editor.paintable(key)
+        painted = [(r.colour, np.flatnonzero(editor.mask(key, r.name)), None)
+                   for r in editor.document.regions]  # fmt: skip
         painted_colours(len(body.points), painted)
-    for region in desk.document.regions:
+    for region in editor.document.regions:
         for number, step in enumerate(region.steps):
             assert np.isfinite(list(shown_numbers(step).values())).all()
             float(step["tool"].get("radius_m", 0.0))
             outcome_of(lambda r=region, n=number: process_of(r, n))
-    outcome_of(lambda: lesson_of(session.clouds, desk.document))
+    outcome_of(lambda: bound_knowledge_of(session.clouds, editor.document))
     session.save()
     assert not Session(folder).damage, "what was opened can be opened again"
 

@@ -13,14 +13,14 @@ pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 import nrdf
 from builders.taught_box import SIZE, cloud, faces
 from nrdf.errors import ModelError
-from nrdf.studio import simulator, uploads
 from nrdf.studio.app import Studio
-from nrdf.studio.computing import Computing
-from nrdf.studio.document import REFERENCE
+from nrdf.studio.model import simulation_process, uploads
+from nrdf.studio.model.computing import LocalComputing
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.uploads import BUNDLED
 from nrdf.studio.panels.targets import ALL
 from nrdf.studio.serving import open_server
-from nrdf.studio.session import Session
-from nrdf.studio.uploads import BUNDLED
 
 
 class Page:
@@ -29,20 +29,20 @@ class Page:
     def __init__(self, folder, weights):
         self.weights, self.said = weights, []
         self.server = open_server("127.0.0.1", 8460)
-        self.studio = Studio(Session(folder), self.server, Computing(self.load), ["chair"], {})
-        tell = self.studio.tell
+        self.studio = Studio(Session(folder), self.server, LocalComputing(self.load), ["chair"], {})
+        notify = self.studio.notify
 
         def heard(title, body, bad=True):
             self.said.append(body)
-            tell(title, body, bad)
+            notify(title, body, bad)
 
-        self.studio.tell = heard
-        self.desk = self.studio.desk
-        self.desk.open_reference("box.ply", cloud(), "chair")
+        self.studio.notify = heard
+        self.editor = self.studio.editor
+        self.editor.open_reference("box.ply", cloud(), "chair")
         for name in ("top", "front"):
-            self.desk.add_region(name)
+            self.editor.add_region(name)
             self.paint(name, faces(cloud())[name])
-        self.desk.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+        self.editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
         self.studio.sync()
         self.studio.region = "top"
 
@@ -54,12 +54,12 @@ class Page:
     def paint(self, name, indices):
         mask = np.zeros(len(cloud()), bool)
         mask[indices] = True
-        self.desk.paint(REFERENCE, name, mask)
+        self.editor.paint(REFERENCE, name, mask)
 
     def does(self, act, *words):
         """What the page says to an act, all of it."""
         self.said.clear()
-        with self.studio.answering():
+        with self.studio.reporting_errors():
             act(*words)
         assert self.studio.worker.wait(60)
         return " ".join(self.said)
@@ -68,9 +68,9 @@ class Page:
         return self.does(self.studio.panel.targets._bring)
 
     def change(self, **numbers):
-        self.desk.change_numbers("top", 0, numbers)
+        self.editor.change_numbers("top", 0, numbers)
         self.does(self.studio.plan, 0.0)
-        return self.studio.panel.process.told.content
+        return self.studio.panel.process.status.content
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_files_that_cannot_be_read(page, monkeypatch):
     assert "chair.ply: not a point cloud that can be read" in said("chair.ply", bytes(range(256)))
     monkeypatch.setattr(uploads, "LARGEST_UPLOAD", 1 << 20)
     assert "big.ply has 2 MiB; at most 1 MiB" in said("big.ply", bytes(1 << 21))
-    assert page.desk.document.reference.name == "box.ply", "what was open stays"
+    assert page.editor.document.reference.name == "box.ply", "what was open stays"
 
 
 def test_regions_that_cannot_be(page):
@@ -100,7 +100,7 @@ def test_regions_that_cannot_be(page):
     assert "tick 'Regions may overlap'" in page.bring()
     page.paint("front", [])
     said = page.bring()
-    assert "front: no points yet" in said and page.studio.bench.is_current("new")
+    assert "front: no points yet" in said and page.studio.results.is_current("new")
     page.paint("top", [])
     assert "no region is painted yet: paint one in step 2" in page.bring()
 
@@ -115,27 +115,29 @@ def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
 
 
 def test_without_a_model_or_a_result(page):
-    assert "nothing has been brought to a target" in page.does(page.studio.trial.start, "new")
+    assert "nothing has been brought to a target" in page.does(
+        page.studio.arm_simulation.start, "new"
+    )
     page.weights = None
     assert "no model for 'chair'" in page.bring()
-    assert "no model for 'chair'" in page.studio.panel._trouble.content, "until the next act"
+    assert "no model for 'chair'" in page.studio.panel._error.content, "until the next act"
     page.does(page.studio.panel.undo)
-    assert not page.studio.panel._trouble.visible
+    assert not page.studio.panel._error.visible
 
 
 def test_without_mujoco_the_button_says_what_to_install(page, monkeypatch):
     page.bring()
-    monkeypatch.setattr(simulator, "find_spec", lambda name: None)
-    assert "pip install 'nrdf[robot]'" in page.does(page.studio.trial.start, "new")
-    assert "press 'Simulate on the arm' first" in page.does(page.studio.trial.play)
-    assert "press 'Simulate on the arm' first" in page.does(page.studio.trial.save, None)
+    monkeypatch.setattr(simulation_process, "find_spec", lambda name: None)
+    assert "pip install 'nrdf[robot]'" in page.does(page.studio.arm_simulation.start, "new")
+    assert "press 'Simulate on the arm' first" in page.does(page.studio.arm_simulation.play)
+    assert "press 'Simulate on the arm' first" in page.does(page.studio.arm_simulation.save, None)
 
 
 def test_several_targets_stand_side_by_side(page):
     page.does(page.studio.panel.targets._add, ALL)
     keys = [REFERENCE, "new", *BUNDLED[1:]]
-    assert page.studio.shown() == keys == list(page.studio.stage.figures)
-    spans = [figure.corners[:, 2] for figure in page.studio.stage.figures.values()]
+    assert page.studio.shown() == keys == list(page.studio.scene.objects)
+    spans = [object_view.corners[:, 2] for object_view in page.studio.scene.objects.values()]
     assert all(a.min() > b.max() for a, b in pairwise(spans)), "none overlap"
     page.does(page.studio.panel.targets._show, "rocker")
     assert page.studio.shown() == [REFERENCE, "rocker"]
@@ -146,23 +148,23 @@ def test_likeness_follows_the_place_that_is_pointed_at(page):
     page.bring()
     assert "point at the reference" in page.does(studio.compare, "new", 3)
     page.does(studio.compare, REFERENCE, 3)
-    first = studio.likeness("new")
-    assert studio.colouring == "likeness" and studio.likeness(REFERENCE).argmin() == 3
-    with studio.answering():
+    first = studio.descriptor_distances("new")
+    assert studio.colouring == "likeness" and studio.descriptor_distances(REFERENCE).argmin() == 3
+    with studio.reporting_errors():
         studio.compare(REFERENCE, 700)
     assert not studio.worker.busy, "at once"
-    assert studio.likeness(REFERENCE).argmin() == 700
-    assert (studio.likeness("new") != first).any()
+    assert studio.descriptor_distances(REFERENCE).argmin() == 700
+    assert (studio.descriptor_distances("new") != first).any()
     page.does(studio.panel.targets._add, "rocker")
     page.bring()
     page.does(studio.compare, REFERENCE, 3)
-    assert studio.likeness("rocker") is not None, "what came later too"
+    assert studio.descriptor_distances("rocker") is not None, "what came later too"
 
 
 def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
     """Taking callbacks away would end the drag that is under way, and turn the camera."""
     taken_away = []
-    ground = page.studio.stage.figures[REFERENCE].ground
+    ground = page.studio.scene.objects[REFERENCE].ground
     take_away = type(ground).remove_drag_callback
 
     def remove_drag_callback(handle, *words):
@@ -182,11 +184,11 @@ def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
 def test_the_room_that_a_tool_needs(page):
     tab = page.studio.panel.process
     page.does(tab.refresh)
-    assert tab.tool_room.value == 20.0
-    tab.tool_room.value = 35.0
+    assert tab.tool_clearance.value == 20.0
+    tab.tool_clearance.value = 35.0
     page.does(tab._tool)
-    assert page.desk.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
-    tab.tool_room.value = -1.0
+    assert page.editor.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
+    tab.tool_clearance.value = -1.0
     page.does(tab._tool)
     page.does(tab.refresh)
-    assert "clearance_m" in tab.told.content and "-0.001" in tab.told.content
+    assert "clearance_m" in tab.status.content and "-0.001" in tab.status.content

@@ -15,8 +15,8 @@ from websockets.sync.client import connect
 
 from nrdf import cli
 from nrdf.errors import OutputError
+from nrdf.studio.model.uploads import LARGEST_UPLOAD
 from nrdf.studio.serving import open_server
-from nrdf.studio.uploads import LARGEST_UPLOAD
 
 
 @pytest.fixture

@@ -36,7 +36,7 @@ def studio(
         no_browser: Do not open a browser.
         device: cpu, cuda, cuda:N or auto.
         robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
-        tool_frame: Body or site of the robot that the tool is mounted on.
+        tool_frame: PaintableCloud or site of the robot that the tool is mounted on.
     """
     from nrdf.errors import ModelError, OutputError
 
@@ -49,9 +49,9 @@ def studio(
     import nrdf
     from nrdf.field.zoo import list_models
     from nrdf.studio.app import Studio
-    from nrdf.studio.computing import SeparateComputing
+    from nrdf.studio.model.computing import ChildProcessComputing
+    from nrdf.studio.model.session import Session
     from nrdf.studio.serving import LOOPBACK, open_server
-    from nrdf.studio.session import Session
 
     categories = [entry.category for entry in list_models()]
     if not categories:
@@ -62,7 +62,7 @@ def studio(
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
-        kept, server, SeparateComputing(partial(nrdf.load_model, device=device)), categories,
+        kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
         origin, robot, tool_frame,
     )  # fmt: skip
     if host not in LOOPBACK:

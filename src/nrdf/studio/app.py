@@ -1,4 +1,4 @@
-"""The page: a desk, a bench and a stage, brought together for everyone who has it open."""
+"""The page: a editor, a results and a stage, brought together for everyone who has it open."""
 
 from __future__ import annotations
 
@@ -12,20 +12,24 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.arm_simulation import Trial
-from nrdf.studio.colours import COLOURINGS, likeness_colours
-from nrdf.studio.computing import Computing, Described, SeparateComputing
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.drawing import colours_of, direction_of, lines_of, title_of
-from nrdf.studio.editor import Desk
+from nrdf.studio.arm_simulation import ArmSimulation
+from nrdf.studio.model.computing import (
+    ChildProcessComputing,
+    CorrespondenceFeatures,
+    LocalComputing,
+)
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.teaching import ORIGIN
+from nrdf.studio.model.uploads import check_upload, shown_name
+from nrdf.studio.model.worker import Progress, Worker
 from nrdf.studio.mouse import Mouse
 from nrdf.studio.panels.panel import Activity, Panel
-from nrdf.studio.result_cache import Bench
-from nrdf.studio.scene_view import Figure, Stage
-from nrdf.studio.session import Session
-from nrdf.studio.teaching import ORIGIN
-from nrdf.studio.uploads import check_upload, shown_name
-from nrdf.studio.worker import Progress, Worker
+from nrdf.studio.scene.colours import COLOURINGS, similarity_colours
+from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.studio.scene.scene_view import ObjectView, SceneView
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,46 +56,46 @@ class Studio:
         self,
         session: Session,
         server: viser.ViserServer,
-        computing: Computing | SeparateComputing,
+        computing: LocalComputing | ChildProcessComputing,
         categories: Sequence[str],
         origin: Mapping[str, Any],
         robot: Path | None = None,
         tool_frame: str | None = None,
     ) -> None:
         self.server, self.categories, self.origin = server, tuple(categories), origin
-        self.desk = Desk(session)
-        self.bench = Bench(self.desk, computing)
-        self.stage = Stage(server)
+        self.editor = Editor(session)
+        self.results = ResultCache(self.editor, computing)
+        self.scene = SceneView(server)
         self.lock = threading.RLock()
         self.region, self.step, self.radius_m = "", 0, 0.05
         self.colouring, self.width = COLOURINGS[0], 0.15
         self.beside: str | None = None
         """The one target that is shown beside the reference, None for all."""
-        self._likeness: dict[str, np.ndarray] = {}
-        self._described: Described | None = None
+        self._distances: dict[str, np.ndarray] = {}
+        self._described: CorrespondenceFeatures | None = None
         self._pointed = self._uploads = 0
         self.mouse = Mouse(self)
         self.panel = Panel(self)
         working = self.panel.working
         self.worker = Worker(working.started, working.progress, self.ended(working))
-        self.trial = Trial(self, robot, tool_frame)
+        self.arm_simulation = ArmSimulation(self, robot, tool_frame)
         server.on_client_connect(self._welcome)
         self.restore()
         if session.damage:
-            self.panel.trouble(f"⚠ **The session was damaged**: {session.damage}")
+            self.panel.show_error(f"⚠ **The session was damaged**: {session.damage}")
 
     # --- what is shown
 
     def restore(self) -> None:
         """Show the session from the beginning, and compute what it needs."""
         with self.lock:
-            document = self.desk.document
+            document = self.editor.document
             self.worker.cancel()
-            self.trial.worker.cancel()
-            self.trial.clear()
-            self.stage.clear(1.0)
-            self.bench.results.clear()
-            self._likeness.clear()
+            self.arm_simulation.worker.cancel()
+            self.arm_simulation.clear()
+            self.scene.clear(1.0)
+            self.results.by_target.clear()
+            self._distances.clear()
             self._described = None
             self.mouse.forget()
             self.region, self.step, self.beside = "", 0, None
@@ -104,31 +108,31 @@ class Studio:
     def sync(self) -> None:
         """Bring stage and panel to what the document says."""
         with self.lock:
-            document, keys = self.desk.document, self.desk.objects()
+            document, keys = self.editor.document, self.editor.object_keys()
             # Another reference, or none any more, is another stage.
-            standing = self.stage.figures.get(REFERENCE)
+            standing = self.scene.objects.get(REFERENCE)
             if standing is not None and (
-                REFERENCE not in keys or standing.body is not self.desk.body(REFERENCE)
+                REFERENCE not in keys or standing.paintable is not self.editor.paintable(REFERENCE)
             ):
-                self.stage.clear(1.0)
-            if REFERENCE in keys and REFERENCE not in self.stage.figures:
-                body = self.desk.body(REFERENCE)
-                side = float((body.high - body.low).max())
-                self.stage.clear(1.0 / side)
+                self.scene.clear(1.0)
+            if REFERENCE in keys and REFERENCE not in self.scene.objects:
+                paintable = self.editor.paintable(REFERENCE)
+                side = float((paintable.high - paintable.low).max())
+                self.scene.clear(1.0 / side)
                 self.radius_m = _PATCH * side
-            gone = [key for key in self.stage.figures if key not in keys]
-            new = [key for key in keys if key not in self.stage.figures]
+            gone = [key for key in self.scene.objects if key not in keys]
+            new = [key for key in keys if key not in self.scene.objects]
             for key in gone:
-                self.stage.remove(key)
-                self.bench.results.pop(key, None)
+                self.scene.remove(key)
+                self.results.by_target.pop(key, None)
             for key in new:
-                self.stage.add(key, self.desk.body(key))
+                self.scene.add(key, self.editor.paintable(key))
             painted = document.region(self.region)
             if painted is None:
                 painted = document.regions[-1] if document.regions else None
                 self.region, self.step = ("" if painted is None else painted.name), 0
             self.step = min(self.step, len(painted.steps) - 1) if painted else 0
-            self.trial.check()
+            self.arm_simulation.check()
             if gone or new:
                 self.arrange()
             self.mouse.grip()
@@ -137,22 +141,22 @@ class Studio:
 
     def shown(self) -> list[str]:
         """The objects that are to be seen: with an arm, the one that it works on."""
-        if self.trial.shown:
-            return [self.trial.key]
-        keys = self.desk.objects()
+        if self.arm_simulation.shown:
+            return [self.arm_simulation.key]
+        keys = self.editor.object_keys()
         return [k for k in keys if k == REFERENCE or self.beside is None or k == self.beside]
 
     def arrange(self) -> None:
         """Let what is to be seen stand side by side, and every camera see all of it."""
         shown = self.shown()
-        self.stage.arrange(shown)
-        self.trial.follow()
-        beside = self.trial.places
-        place, middle = self.stage.camera(shown, _ASPECT, beside)
+        self.scene.arrange(shown)
+        self.arm_simulation.follow()
+        beside = self.arm_simulation.places
+        place, middle = self.scene.camera(shown, _ASPECT, beside)
         initial = self.server.initial_camera
         initial.position, initial.look_at = tuple(place), tuple(middle)
         for client in self.server.get_clients().values():
-            place, middle = self.stage.camera(shown, client.camera.aspect, beside)
+            place, middle = self.scene.camera(shown, client.camera.aspect, beside)
             with client.atomic():
                 client.camera.position = place
                 client.camera.look_at = middle
@@ -160,22 +164,22 @@ class Studio:
     def draw(self) -> None:
         """Colours, lines, names and the arrow, of all objects."""
         with self.lock, self.server.atomic():
-            for key, figure in self.stage.figures.items():
-                self.draw_colours(figure)
-                lines = {} if self._alike(figure) else lines_of(self.desk, self.bench, key)
-                figure.draw_lines(lines)
-                figure.name(title_of(self.desk, self.bench, key))
-            if REFERENCE in self.stage.figures:
-                ends = direction_of(self.desk, self.region, self.step)
-                self.stage.figures[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
+            for key, object_view in self.scene.objects.items():
+                self.draw_colours(object_view)
+                lines = {} if self._alike(object_view) else lines_of(self.editor, self.results, key)
+                object_view.draw_lines(lines)
+                object_view.name(title_of(self.editor, self.results, key))
+            if REFERENCE in self.scene.objects:
+                ends = direction_of(self.editor, self.region, self.step)
+                self.scene.objects[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
 
-    def draw_colours(self, figure: Figure) -> None:
+    def draw_colours(self, object_view: ObjectView) -> None:
         """The colours of one object."""
-        if self._alike(figure):
-            figure.paint(likeness_colours(self._likeness[figure.key], self.width))
+        if self._alike(object_view):
+            object_view.paint(similarity_colours(self._distances[object_view.key], self.width))
         else:
             by_confidence = self.colouring == "confidence"
-            figure.paint(colours_of(self.desk, self.bench, figure.key, by_confidence))
+            object_view.paint(colours_of(self.editor, self.results, object_view.key, by_confidence))
 
     def recolour(self, colouring: str, width: float) -> None:
         """Colour by something else, or another width of likeness.
@@ -183,17 +187,17 @@ class Studio:
         Raises NrdfError for likeness where no point has been asked for.
         """
         with self.lock:
-            if colouring == "likeness" and not self._likeness:
+            if colouring == "likeness" and not self._distances:
                 raise NrdfError("take 'Alike' and click a point of the reference first")
             self.colouring, self.width = colouring, width
             self.draw()
 
-    def likeness(self, key: str) -> np.ndarray | None:
+    def descriptor_distances(self, key: str) -> np.ndarray | None:
         """How far an object's shown points (k,) are from the place that was pointed at, if any."""
-        return self._likeness.get(key)
+        return self._distances.get(key)
 
-    def _alike(self, figure: Figure) -> bool:
-        return self.colouring == "likeness" and figure.key in self._likeness
+    def _alike(self, object_view: ObjectView) -> bool:
+        return self.colouring == "likeness" and object_view.key in self._distances
 
     def painted(self) -> None:
         """What follows a change of regions: lines that no longer hold go, and new ones come."""
@@ -202,23 +206,23 @@ class Studio:
         self.draw()
         self.panel.refresh()
         self.plan()
-        current = self.bench.is_current
-        if any(t.corrected and not current(t.object.name) for t in self.desk.document.targets):
+        current = self.results.is_current
+        if any(t.corrected and not current(t.object.name) for t in self.editor.document.targets):
             self.transfer(_PLAN_AFTER_S)
 
     # --- long work
 
     def plan(self, delay_s: float = _PLAN_AFTER_S) -> None:
         """Plan on the reference what is not planned yet, in the background."""
-        document = self.desk.document
+        document = self.editor.document
         self._later("plan", "planning on the reference", delay_s,
-                    lambda progress: self.bench.make_plans(document, progress))  # fmt: skip
+                    lambda progress: self.results.make_plans(document, progress))  # fmt: skip
 
     def transfer(self, delay_s: float = 0.0) -> None:
         """Bring the processes to the targets, in the background."""
-        document = self.desk.document
+        document = self.editor.document
         self._later("transfer", "finding regions and planning tool paths", delay_s,
-                    lambda progress: self.bench.transfer(document, progress))  # fmt: skip
+                    lambda progress: self.results.transfer(document, progress))  # fmt: skip
 
     def read(
         self, file: Any, category: str, unit: str | None, then: Callable[[PointCloud], None]
@@ -231,7 +235,7 @@ class Studio:
         check_upload(name, len(content))
 
         def work(progress: Progress) -> None:
-            cloud = self.bench.read(name, content, category, unit, progress)
+            cloud = self.results.read(name, content, category, unit, progress)
             with self.lock:
                 then(cloud)
 
@@ -245,19 +249,19 @@ class Studio:
             raise NrdfError("point at the reference: what is like that place lights up elsewhere")
         self._pointed = index
         if self._described is not None and self.colouring == "likeness":
-            self._likeness = self._described.unlike(index)
-            for figure in self.stage.figures.values():
-                self.draw_colours(figure)
+            self._distances = self._described.distances(index)
+            for object_view in self.scene.objects.values():
+                self.draw_colours(object_view)
             return
-        document = self.desk.document
+        document = self.editor.document
 
         def work(progress: Progress) -> None:
-            described = self.bench.described(document, progress)
+            described = self.results.described(document, progress)
             with self.lock:
                 self._described = described
-                self._likeness, self.colouring = described.unlike(self._pointed), "likeness"
+                self._distances, self.colouring = described.distances(self._pointed), "likeness"
 
-        if self._described is not None or not self.worker.does("likeness"):
+        if self._described is not None or not self.worker.has_job("likeness"):
             self._described = None
             self._later("likeness", "comparing descriptors", 0.0, work)
 
@@ -284,51 +288,51 @@ class Studio:
         def end(what: str, error: str) -> None:
             activity.ended()
             if error == "cancelled":
-                self.tell(what, "cancelled; what was finished is kept", bad=False)
+                self.notify(what, "cancelled; what was finished is kept", bad=False)
             elif error:
-                self.tell(what, error)
+                self.notify(what, error)
 
         return end
 
     def stop(self) -> None:
         """End all that runs beside the page."""
         self.worker.stop()
-        self.bench.stop()
-        self.trial.stop()
+        self.results.stop()
+        self.arm_simulation.stop()
 
     # --- talking
 
     def need_region(self) -> None:
         """Raises NrdfError where there is no region to work on."""
-        if self.desk.document.region(self.region) is None:
+        if self.editor.document.region(self.region) is None:
             raise NrdfError("there is no region yet: press 'New region' in step 2 first")
 
     @contextmanager
-    def answering(self) -> Iterator[None]:
+    def reporting_errors(self) -> Iterator[None]:
         """A block that holds the lock; what goes wrong in it is said on the page."""
         with self.lock:
-            self.panel.trouble("")
+            self.panel.show_error("")
             try:
                 yield
             except NrdfError as error:
                 self.panel.refresh()
-                self.tell("That did not work", str(error))
+                self.notify("That did not work", str(error))
             except Exception as error:
                 log.exception("a fault of the studio")
-                self.tell("A fault of nrdf", f"{type(error).__name__}: {error}")
+                self.notify("A fault of nrdf", f"{type(error).__name__}: {error}")
 
-    def tell(self, title: str, body: str, bad: bool = True) -> None:
+    def notify(self, title: str, body: str, bad: bool = True) -> None:
         """A notification on every open page; what is bad stays in the panel until the next act."""
         body = body.removeprefix(f"{ORIGIN}: ")
         if bad:
-            self.panel.trouble(f"⚠ **{title}**: {body}")
+            self.panel.show_error(f"⚠ **{title}**: {body}")
         for client in self.server.get_clients().values():
             client.add_notification(
                 title, body, color="red" if bad else "teal", auto_close_seconds=15 if bad else 6
             )
 
     def _welcome(self, client: viser.ClientHandle) -> None:
-        session = self.desk.session
-        if session.restored and self.desk.document.reference is not None:
+        session = self.editor.session
+        if session.restored and self.editor.document.reference is not None:
             said = f"as you left it, from the folder {session.folder.name}"
             client.add_notification("Your session is here", said, auto_close_seconds=8)

@@ -6,24 +6,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nrdf.errors import RobotError
-from nrdf.studio.arm_view import Rig
-from nrdf.studio.player import Player
-from nrdf.studio.result_cache import Result
-from nrdf.studio.saving import place_of, save_job, zipped
-from nrdf.studio.simulator import Simulator, need_engine
-from nrdf.studio.worker import Progress, Worker
+from nrdf.studio.model.result_cache import TargetResult
+from nrdf.studio.model.saving import place_of, save_job, zipped
+from nrdf.studio.model.simulation_process import SimulationProcess, require_mujoco
+from nrdf.studio.model.worker import Progress, Worker
+from nrdf.studio.scene.arm_view import ArmView
+from nrdf.studio.scene.player import Player
 
 if TYPE_CHECKING:
     import numpy as np
     import viser
 
     from nrdf.studio.app import Studio
-    from nrdf.studio.playback import Playback
+    from nrdf.studio.model.playback import Playback
 
 SIMULATION = "sim"
 
 
-class Trial:
+class ArmSimulation:
     """One target's job on the arm: that of the last simulation.
 
     robot, tool_frame: of `nrdf.robot.model.arm.load_arm`, the bundled arm unless given.
@@ -35,21 +35,21 @@ class Trial:
         self.worker = Worker(activity.started, activity.progress, studio.ended(activity))
         self.player = Player(self._advance)
         self.key, self.time_s, self.shown = "", 0.0, False
-        self._rig: Rig | None = None
-        self._simulator: Simulator | None = None
-        self._result: Result | None = None
+        self._arm_view: ArmView | None = None
+        self._process: SimulationProcess | None = None
+        self._result: TargetResult | None = None
         self._job = Path()
 
     @property
     def playback(self) -> Playback | None:
         """What there is to play."""
-        return None if self._rig is None else self._rig.playback
+        return None if self._arm_view is None else self._arm_view.playback
 
     @property
     def is_current(self) -> bool:
         """Whether what was simulated is what is on the target now."""
-        bench = self.studio.bench
-        return bench.is_current(self.key) and bench.results.get(self.key) is self._result
+        results = self.studio.results
+        return results.is_current(self.key) and results.by_target.get(self.key) is self._result
 
     # --- simulating
 
@@ -59,8 +59,8 @@ class Trial:
         Raises RobotError where the simulation's engine is missing, ProcessError where the target
         has no current result.
         """
-        result = self.studio.bench.ready(key)
-        need_engine()
+        result = self.studio.results.ready(key)
+        require_mujoco()
         what = f"simulating the arm on {key}"
 
         def say(phase: str) -> None:
@@ -68,13 +68,13 @@ class Trial:
 
         def work(progress: Progress) -> None:
             progress(0, 1)
-            job = save_job(self.studio.desk, key, result, self.studio.origin)
-            simulator = Simulator(job, self._robot, self._tool_frame)
+            job = save_job(self.studio.editor, key, result, self.studio.origin)
+            process = SimulationProcess(job, self._robot, self._tool_frame)
             try:
-                playback = simulator.drive(progress, say)
-                self._put(key, result, job, playback, simulator)
+                playback = process.drive(progress, say)
+                self._put(key, result, job, playback, process)
             except BaseException:
-                simulator.end()
+                process.end()
                 raise
 
         self.worker.submit("simulate", what, work)
@@ -84,18 +84,18 @@ class Trial:
 
         Raises RobotError where there is none of what is on the target now.
         """
-        simulator, key = self._simulator, self.key
-        if simulator is None:
+        process, key = self._process, self.key
+        if process is None:
             raise RobotError("nothing is simulated yet: press 'Simulate on the arm' first")
         if not self.is_current:
             raise RobotError(
                 f"the simulation is of before your last change to {key}: simulate again"
             )
-        place = place_of(self.studio.desk, key, SIMULATION)
+        place = place_of(self.studio.editor, key, SIMULATION)
         origin = {**self.studio.origin, "job": str(self._job)}
 
         def work(progress: Progress) -> None:
-            simulator.write(place, key, origin, progress)
+            process.write(place, key, origin, progress)
             client.send_file_download(f"{key}-sim.zip", zipped(place), save_immediately=True)
             with self.studio.lock:
                 self.studio.panel.arm.saved(place, self._job)
@@ -105,31 +105,36 @@ class Trial:
     def clear(self) -> None:
         """Put the arm away, and forget the simulation."""
         self.player.pause()
-        if self._simulator is not None:
-            self._simulator.end()
-        if self._rig is not None:
-            self._rig.remove()
-        self._rig = self._simulator = self._result = None
+        if self._process is not None:
+            self._process.end()
+        if self._arm_view is not None:
+            self._arm_view.remove()
+        self._arm_view = self._process = self._result = None
         self.key, self.shown = "", False
 
     def stop(self) -> None:
         """End everything that runs."""
         self.worker.stop()
         self.player.stop()
-        if self._simulator is not None:
-            self._simulator.end()
+        if self._process is not None:
+            self._process.end()
 
     def _put(
-        self, key: str, result: Result, job: Path, playback: Playback, simulator: Simulator
+        self,
+        key: str,
+        result: TargetResult,
+        job: Path,
+        playback: Playback,
+        process: SimulationProcess,
     ) -> None:
         studio = self.studio
         with studio.lock, studio.server.atomic():
             self.clear()
-            figure = studio.stage.figures.get(key)
-            if figure is None:
+            object_view = studio.scene.objects.get(key)
+            if object_view is None:
                 raise RobotError(f"{key} is not there any more")
-            self._rig = Rig(figure, playback)
-            self._simulator, self._result, self._job = simulator, result, job
+            self._arm_view = ArmView(object_view, playback)
+            self._process, self._result, self._job = process, result, job
             self.key, self.time_s, self.shown = key, 0.0, True
             studio.arrange()
             studio.panel.refresh()
@@ -138,23 +143,26 @@ class Trial:
 
     def check(self) -> None:
         """Go where the object has gone."""
-        figures = self.studio.stage.figures
-        if self._rig is not None and figures.get(self.key) is not self._rig.figure:
+        object_views = self.studio.scene.objects
+        if (
+            self._arm_view is not None
+            and object_views.get(self.key) is not self._arm_view.object_view
+        ):
             self.clear()
 
     def follow(self) -> None:
         """Stand with the object, which has just been put somewhere, if the arm is to be seen."""
-        if self._rig is not None:
-            self._rig.see(self.shown)
+        if self._arm_view is not None:
+            self._arm_view.see(self.shown)
             if self.shown:
-                self._rig.stand(self._rig.figure.offset)
+                self._arm_view.stand(self._arm_view.object_view.offset)
 
     def show(self, shown: bool) -> None:
         """Show the arm with its object alone, or all objects without it.
 
         Raises RobotError where there is no arm to show.
         """
-        if self._rig is None:
+        if self._arm_view is None:
             raise RobotError("there is no arm to show yet: press 'Simulate on the arm' first")
         self.shown = shown
         if not shown:
@@ -165,26 +173,26 @@ class Trial:
         """Play from where it is, or from the beginning where it is at its end."""
         if not self.shown:
             self.show(True)
-        assert self._rig is not None  # else `show` raises
-        if self.time_s >= self._rig.playback.seconds:
+        assert self._arm_view is not None  # else `show` raises
+        if self.time_s >= self._arm_view.playback.seconds:
             self.seek(0.0)
         self.player.play()
 
     def seek(self, time_s: float) -> None:
         """Show a moment."""
-        if self._rig is None:
+        if self._arm_view is None:
             return
         self.time_s = time_s
         if self.shown:
             with self.studio.server.atomic():
-                self._rig.show(self._rig.playback.at(time_s))
+                self._arm_view.show(self._arm_view.playback.at(time_s))
 
     def _advance(self, seconds: float) -> bool:
         """Let time go on; whether there is more."""
         with self.studio.lock:
-            if self._rig is None:
+            if self._arm_view is None:
                 return False
-            end = self._rig.playback.seconds
+            end = self._arm_view.playback.seconds
             self.seek(min(self.time_s + seconds, end))
             more = self.time_s < end
             if not more:
@@ -195,4 +203,4 @@ class Trial:
     @property
     def places(self) -> np.ndarray | None:
         """Places (k, 3) in the scene that a camera has to see, if an arm is shown."""
-        return None if self._rig is None or not self.shown else self._rig.places
+        return None if self._arm_view is None or not self.shown else self._arm_view.places

@@ -9,10 +9,10 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.drawing import found
-from nrdf.studio.scene_view import Figure
-from nrdf.studio.view import View, inside
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.scene.camera import Camera, inside
+from nrdf.studio.scene.drawing import found
+from nrdf.studio.scene.scene_view import ObjectView
 
 if TYPE_CHECKING:
     from nrdf.studio.app import Studio
@@ -25,7 +25,7 @@ _BRUSH = 0.4  # radius of the brush, in radii of a patch
 class _Grown:
     """The patch grown last, which follows the radius: where, and the region (k,) before it."""
 
-    figure: Figure
+    object_view: ObjectView
     region: str
     index: int
     before: np.ndarray
@@ -39,7 +39,7 @@ class Mouse:
         self.studio = studio
         self.tool, self.erase, self.through = TOOLS[0], False, False
         self._grown: _Grown | None = None
-        self._drag: tuple[Figure, int] | None = None
+        self._drag: tuple[ObjectView, int] | None = None
         self._boxes = False
         studio.server.scene.on_click()(self._clicked)
 
@@ -66,8 +66,8 @@ class Mouse:
                 scene.on_rect_select()(self._boxed)
             else:
                 scene.remove_rect_select_callback()
-        for figure in self.studio.stage.figures.values():
-            figure.let_drag(self._dragged if drags else None)
+        for object_view in self.studio.scene.objects.values():
+            object_view.let_drag(self._dragged if drags else None)
 
     def regrow(self, radius_m: float) -> None:
         """Another radius, also for the patch that was grown last."""
@@ -75,49 +75,51 @@ class Mouse:
         grown = self._grown
         if grown is None or grown.region != self.studio.region:
             return
-        patch = grown.figure.body.canvas.patch(grown.index, radius_m)
-        self._paint(grown.figure, _painted(grown.before, patch, grown.erase), merge=True)
+        patch = grown.object_view.paintable.canvas.patch(grown.index, radius_m)
+        self._paint(grown.object_view, _painted(grown.before, patch, grown.erase), merge=True)
         self.studio.painted()
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
-        with self.studio.answering():
-            met = self.studio.stage.hit(np.array(event.ray_origin), np.array(event.ray_direction))
+        with self.studio.reporting_errors():
+            met = self.studio.scene.hit(np.array(event.ray_origin), np.array(event.ray_direction))
             if met is None or self.tool not in ("Grow", "Brush", "Alike"):
                 return
-            figure, index = met
+            object_view, index = met
             if self.tool == "Alike":
-                self.studio.compare(figure.key, index)
+                self.studio.compare(object_view.key, index)
                 return
-            self._check(figure)
-            before = self._current(figure)
+            self._check(object_view)
+            before = self._current(object_view)
             wide = self.tool == "Grow"
             radius = self.studio.radius_m * (1.0 if wide else _BRUSH)
-            patch = figure.body.canvas.patch(index, radius)
-            grown = _Grown(figure, self.studio.region, index, before, self.erase)
+            patch = object_view.paintable.canvas.patch(index, radius)
+            grown = _Grown(object_view, self.studio.region, index, before, self.erase)
             self._grown = grown if wide else None
-            self._paint(figure, _painted(before, patch, self.erase))
+            self._paint(object_view, _painted(before, patch, self.erase))
             self.studio.painted()
 
     def _boxed(self, event: viser.SceneRectSelectEvent) -> None:
-        with self.studio.answering():
+        with self.studio.reporting_errors():
             corners = (event.screen_min, event.screen_max)
-            view = view_of(event.client)
+            view = camera_of(event.client)
             for key in self.studio.shown():
-                figure = self.studio.stage.figures[key]
-                body = figure.body
+                object_view = self.studio.scene.objects[key]
+                paintable = object_view.paintable
                 chosen = inside(
-                    figure.view(view), body.points, body.normals, corners,
-                    body.surface.spacing, self.through,
+                    object_view.view(view), paintable.points, paintable.normals, corners,
+                    paintable.surface.spacing, self.through,
                 )  # fmt: skip
                 if chosen.any():
-                    self._check(figure)
-                    self._paint(figure, _painted(self._current(figure), chosen, self.erase))
+                    self._check(object_view)
+                    self._paint(
+                        object_view, _painted(self._current(object_view), chosen, self.erase)
+                    )
             self.studio.painted()
 
     async def _dragged(self, event: viser.SceneNodeDragEvent[Any]) -> None:
         # On the event loop, so that a stroke's parts come in order.
-        with self.studio.answering():
-            view, stage = view_of(event.client), self.studio.stage
+        with self.studio.reporting_errors():
+            view, stage = camera_of(event.client), self.studio.scene
             met = stage.hit(view.position, view.ray(event.end_screen_pos))
             if event.phase == "start":
                 self.forget()
@@ -126,57 +128,59 @@ class Mouse:
                     self._check(self._drag[0])
             if self._drag is None:
                 return
-            figure, first = self._drag
-            index = met[1] if met is not None and met[0] is figure else None
+            object_view, first = self._drag
+            index = met[1] if met is not None and met[0] is object_view else None
             if self.tool == "Alike":
                 if index is not None:
-                    self.studio.compare(figure.key, index)
+                    self.studio.compare(object_view.key, index)
             elif self.tool == "Brush":
                 start = event.phase == "start"
                 at = [i for i in (first if start else None, index) if i is not None]
                 if at:
-                    patch = figure.body.canvas.patch(at, _BRUSH * self.studio.radius_m)
-                    mask = _painted(self._current(figure), patch, self.erase)
-                    self._paint(figure, mask, merge=not start)
-            elif index is not None and index != first and figure.key == REFERENCE:
-                self._point(figure, first, index, event.phase == "end")
+                    patch = object_view.paintable.canvas.patch(at, _BRUSH * self.studio.radius_m)
+                    mask = _painted(self._current(object_view), patch, self.erase)
+                    self._paint(object_view, mask, merge=not start)
+            elif index is not None and index != first and object_view.key == REFERENCE:
+                self._point(object_view, first, index, event.phase == "end")
             if event.phase == "end":
                 self._drag = None
                 if self.tool != "Alike":
                     self.studio.painted()
 
-    def _point(self, figure: Figure, first: int, last: int, final: bool) -> None:
-        start, stop = figure.body.points[first], figure.body.points[last]
-        figure.draw_arrow("direction", start, stop)
+    def _point(self, object_view: ObjectView, first: int, last: int, final: bool) -> None:
+        start, stop = object_view.paintable.points[first], object_view.paintable.points[last]
+        object_view.draw_arrow("direction", start, stop)
         if final:
             along = (stop - start) / np.linalg.norm(stop - start)
             direction = [round(float(x), 4) for x in along]
-            self.studio.desk.change_step(self.studio.region, self.studio.step, direction=direction)
-
-    def _check(self, figure: Figure) -> None:
-        """Raises NrdfError where there is nothing to paint."""
-        self.studio.need_region()
-        if figure.key != REFERENCE and figure.key not in self.studio.bench.results:
-            raise NrdfError(
-                f"nothing has been brought to {figure.key} yet: press 'Bring the process there' in "
-                "step 4 first, then correct its regions here"
+            self.studio.editor.change_step(
+                self.studio.region, self.studio.step, direction=direction
             )
 
-    def _current(self, figure: Figure) -> np.ndarray:
+    def _check(self, object_view: ObjectView) -> None:
+        """Raises NrdfError where there is nothing to paint."""
+        self.studio.need_region()
+        if object_view.key != REFERENCE and object_view.key not in self.studio.results.by_target:
+            raise NrdfError(
+                f"nothing has been brought to {object_view.key} yet: press 'Bring the process "
+                "there' in step 4 first, then correct its regions here"
+            )
+
+    def _current(self, object_view: ObjectView) -> np.ndarray:
         """The shown points of an object that are in the region now."""
         studio = self.studio
-        there = found(studio.bench, figure.key, studio.region)
-        return studio.desk.mask(figure.key, studio.region, there)
+        there = found(studio.results, object_view.key, studio.region)
+        return studio.editor.mask(object_view.key, studio.region, there)
 
-    def _paint(self, figure: Figure, mask: np.ndarray, merge: bool = False) -> None:
-        self.studio.desk.paint(figure.key, self.studio.region, mask, merge)
-        self.studio.draw_colours(figure)
+    def _paint(self, object_view: ObjectView, mask: np.ndarray, merge: bool = False) -> None:
+        self.studio.editor.paint(object_view.key, self.studio.region, mask, merge)
+        self.studio.draw_colours(object_view)
 
 
-def view_of(client: viser.ClientHandle) -> View:
+def camera_of(client: viser.ClientHandle) -> Camera:
     """The camera of a browser."""
     camera = client.camera
-    return View.of(camera.position, camera.wxyz, camera.fov, camera.aspect)
+    return Camera.of(camera.position, camera.wxyz, camera.fov, camera.aspect)
 
 
 def _painted(before: np.ndarray, patch: np.ndarray, erase: bool) -> np.ndarray:

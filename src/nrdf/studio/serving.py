@@ -18,7 +18,7 @@ from viser.infra import ClientId
 from websockets.asyncio.server import Request, Response, ServerConnection
 
 from nrdf.errors import OutputError
-from nrdf.studio.uploads import LARGEST_UPLOAD, shown_name, too_large
+from nrdf.studio.model.uploads import LARGEST_UPLOAD, shown_name, too_large
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _OWN_HOSTS = r"(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"

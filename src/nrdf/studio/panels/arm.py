@@ -47,41 +47,47 @@ class ArmTab:
         )
         self.save = gui.add_button("Save the simulation")
         self.place = gui.add_markdown("")
-        self.told = gui.add_markdown("")
-        panel.on(self.simulate.on_click, lambda _: self.studio.trial.start(self.target.value))
+        self.status = gui.add_markdown("")
+        panel.on(
+            self.simulate.on_click, lambda _: self.studio.arm_simulation.start(self.target.value)
+        )
         panel.on(self.play.on_click, lambda _: self._play())
         panel.on(self.time.on_update, lambda said: self._seek(float(said.value)))
         panel.on(self.speed.on_update, lambda said: self._speed(said.value))
         panel.on(self.shown.on_update, lambda said: self._show(said.value))
-        panel.on(self.save.on_click, lambda said: self.studio.trial.save(said.client))
+        panel.on(self.save.on_click, lambda said: self.studio.arm_simulation.save(said.client))
 
     def refresh(self) -> None:
         """The targets, and what was simulated."""
-        trial = self.studio.trial
-        keys = [key for key in self.studio.desk.objects()[1:] if key in self.studio.bench.results]
-        self.panel.offer(self.target, tuple(keys) or (NO_TARGET,))
-        playback = trial.playback
+        simulation = self.studio.arm_simulation
+        keys = [
+            key
+            for key in self.studio.editor.object_keys()[1:]
+            if key in self.studio.results.by_target
+        ]
+        self.panel.set_options(self.target, tuple(keys) or (NO_TARGET,))
+        playback = simulation.playback
         self.play.disabled = self.time.disabled = self.save.disabled = playback is None
-        self.panel.put(self.shown, trial.shown)
+        self.panel.set_value(self.shown, simulation.shown)
         if playback is None:
-            self.told.content = self.place.content = ""
+            self.status.content = self.place.content = ""
         else:
             self.time.max = max(round(playback.seconds, 1), 0.1)
-            old = "" if trial.is_current else " *(of before your last change)*"
-            self.told.content = f"**{trial.key}**{old}: {verdicts(playback.report)}"
+            old = "" if simulation.is_current else " *(of before your last change)*"
+            self.status.content = f"**{simulation.key}**{old}: {verdicts(playback.report)}"
         self.played()
 
     def played(self) -> None:
         """Where the playing is."""
-        trial, playback = self.studio.trial, self.studio.trial.playback
-        label = "Pause" if trial.player.playing else "Play"
+        simulation, playback = self.studio.arm_simulation, self.studio.arm_simulation.playback
+        label = "Pause" if simulation.player.playing else "Play"
         if self.play.label != label:
             self.play.label = label
         if playback is None:
             self.now.content = ""
             return
-        self.panel.put(self.time, round(min(trial.time_s, self.time.max), 1))
-        at = playback.at(trial.time_s)
+        self.panel.set_value(self.time, round(min(simulation.time_s, self.time.max), 1))
+        at = playback.at(simulation.time_s)
         path = playback.report["paths"][playback.path[at]]
         words = [f"{path['region']}, {path['process']}", _DOING[str(playback.doing[at])]]
         if playback.line[at] >= 0:
@@ -97,24 +103,24 @@ class ArmTab:
         self.place.content = f"Written to `{place}`, as `nrdf simulate {job} --out …` does."
 
     def _play(self) -> None:
-        trial = self.studio.trial
-        if trial.player.playing:
-            trial.player.pause()
+        simulation = self.studio.arm_simulation
+        if simulation.player.playing:
+            simulation.player.pause()
         else:
-            trial.player.speed = _factor(self.speed.value)
-            trial.play()
+            simulation.player.speed = _factor(self.speed.value)
+            simulation.play()
         self.refresh()
 
     def _seek(self, time_s: float) -> None:
-        self.studio.trial.seek(time_s)
+        self.studio.arm_simulation.seek(time_s)
         self.played()
 
     def _speed(self, shown: str) -> None:
-        self.studio.trial.player.speed = _factor(shown)
+        self.studio.arm_simulation.player.speed = _factor(shown)
 
     def _show(self, shown: bool) -> None:
         try:
-            self.studio.trial.show(shown)
+            self.studio.arm_simulation.show(shown)
         finally:
             self.refresh()
 

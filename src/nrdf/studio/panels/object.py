@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 from nrdf.bundled import KNOWLEDGE, REFERENCE
 from nrdf.geometry.units import METRES
 from nrdf.process.bound_knowledge import read_bound_knowledge
-from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled
+from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 
 if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
-    from nrdf.studio.panels.panel import Panel, Said
+    from nrdf.studio.panels.panel import Panel, PanelEvent
 
 AS_IN_FILE = "as the file says"
 TAUGHT = "chair with its five processes"
@@ -34,7 +34,7 @@ class ObjectTab:
         self.upload = gui.add_upload_button(
             "Load a file …", mime_type=",".join(ENDINGS), hint=f"{', '.join(ENDINGS)}"
         )
-        self.told = gui.add_markdown("")
+        self.status = gui.add_markdown("")
         self.anew = gui.add_button("Start anew", color="gray")
         panel.on(self.open.on_click, lambda _: self._open())
         panel.on(self.upload.on_upload, lambda said: self._load(said.value))
@@ -42,35 +42,35 @@ class ObjectTab:
 
     def refresh(self) -> None:
         """What the reference is."""
-        reference = self.studio.desk.document.reference
+        reference = self.studio.editor.document.reference
         if reference is None:
-            self.told.content = "Nothing is open yet."
+            self.status.content = "Nothing is open yet."
             return
         size = reference.cloud.points.max(axis=0) - reference.cloud.points.min(axis=0)
         sides = " × ".join(f"{1e3 * side:.0f}" for side in size)
-        self.told.content = (
-            f"**{reference.name}**, a {self.studio.desk.document.category}: "
+        self.status.content = (
+            f"**{reference.name}**, a {self.studio.editor.document.category}: "
             f"{len(reference.cloud)} points, {sides} mm. Everything you do is saved at once."
         )
 
     def _open(self) -> None:
         name = self.bundled.value
         if name == TAUGHT:
-            self.studio.desk.open_lesson(REFERENCE, read_bound_knowledge(KNOWLEDGE))
+            self.studio.editor.open_knowledge(REFERENCE, read_bound_knowledge(KNOWLEDGE))
         else:
-            self.studio.desk.open_reference(name, bundled(name), "chair")
+            self.studio.editor.open_reference(name, bundled(name), "chair")
         self.studio.restore()
 
     def _load(self, file: Any) -> None:
         category = self.category.value
 
         def opened(cloud: PointCloud) -> None:
-            self.studio.desk.open_reference(file.name, cloud, category)
+            self.studio.editor.open_reference(file.name, cloud, category)
             self.studio.restore()
 
         self.studio.read(file, category, unit_of(self.unit.value), opened)
 
-    def _ask(self, said: Said) -> None:
+    def _ask(self, said: PanelEvent) -> None:
         gui = self.studio.server.gui
         with gui.add_modal("Start anew?") as modal:
             gui.add_markdown(
@@ -82,7 +82,7 @@ class ObjectTab:
 
         def anew(_: Any) -> None:
             modal.close()
-            self.studio.desk.start_anew()
+            self.studio.editor.start_anew()
             self.studio.restore()
 
         self.panel.on(yes.on_click, anew)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nrdf.errors import RegionError
-from nrdf.studio.document import REFERENCE
+from nrdf.studio.model.document import REFERENCE
 
 if TYPE_CHECKING:
     from nrdf.studio.panels.panel import Panel
@@ -31,7 +31,7 @@ class PaintTab:
         self.through = gui.add_checkbox(
             "Box takes what is hidden too", False, hint="Else only points that you see."
         )
-        self.told = gui.add_markdown("")
+        self.status = gui.add_markdown("")
         self.history = gui.add_button_group("History", ("Undo", "Redo"))
         self.more = gui.add_button_group("More", ("Mirror", "Clear", "Delete"))
         self.overlap = gui.add_checkbox("Regions may overlap", False)
@@ -48,24 +48,24 @@ class PaintTab:
     def refresh(self) -> None:
         """The region that is painted now."""
         studio = self.studio
-        region = studio.desk.document.region(studio.region)
-        self.panel.put(self.radius, int(np.clip(round(1e3 * studio.radius_m), 5, 500)))
-        self.panel.put(self.overlap, studio.desk.document.allow_overlap)
+        region = studio.editor.document.region(studio.region)
+        self.panel.set_value(self.radius, int(np.clip(round(1e3 * studio.radius_m), 5, 500)))
+        self.panel.set_value(self.overlap, studio.editor.document.allow_overlap)
         if region is None:
-            self.told.content = "There is no region yet."
+            self.status.content = "There is no region yet."
             return
-        self.panel.put(self.name, region.name)
-        self.panel.put(self.colour, region.colour)
+        self.panel.set_value(self.name, region.name)
+        self.panel.set_value(self.colour, region.colour)
         count, share = int(region.mask.sum()), float(region.mask.mean())
         lines = [f"**{region.name}**: {count} points, {share:.1%} of the object."]
-        shared = [] if studio.desk.document.allow_overlap else studio.desk.shared()
+        shared = [] if studio.editor.document.allow_overlap else studio.editor.shared()
         lines += [f"⚠ {line.split(';')[0]}: the dark points." for line in shared]
-        self.told.content = "  \n".join(lines)
+        self.status.content = "  \n".join(lines)
 
     def _new(self) -> None:
-        if self.studio.desk.document.reference is None:
+        if self.studio.editor.document.reference is None:
             raise RegionError("there is no object to paint on: open one in step 1")
-        self.studio.region = self.studio.desk.add_region()
+        self.studio.region = self.studio.editor.add_region()
         self.studio.step = 0
         if self.studio.mouse.tool == "Turn":
             self.studio.mouse.take("Grow")
@@ -74,7 +74,7 @@ class PaintTab:
     def _rename(self, name: str) -> None:
         self.studio.need_region()
         try:
-            self.studio.desk.rename_region(self.studio.region, name)
+            self.studio.editor.rename_region(self.studio.region, name)
             self.studio.region = name.strip()
         finally:
             self.studio.sync()
@@ -82,7 +82,7 @@ class PaintTab:
 
     def _recolour(self, colour: tuple[int, int, int]) -> None:
         self.studio.need_region()
-        self.studio.desk.recolour_region(self.studio.region, colour)
+        self.studio.editor.recolour_region(self.studio.region, colour)
         self.studio.draw()
 
     def _radius(self, millimetres: float) -> None:
@@ -93,7 +93,7 @@ class PaintTab:
             setattr(self.studio.mouse, name, value)
 
     def _overlap(self, allowed: bool) -> None:
-        self.studio.desk.allow_overlap(allowed)
+        self.studio.editor.allow_overlap(allowed)
         self.refresh()
 
     def _history(self, which: str) -> None:
@@ -105,14 +105,14 @@ class PaintTab:
     def _more(self, which: str) -> None:
         studio = self.studio
         studio.need_region()
-        mask: Any = studio.desk.mask(REFERENCE, studio.region)
+        mask: Any = studio.editor.mask(REFERENCE, studio.region)
         if which == "Delete":
-            studio.desk.remove_region(studio.region)
+            studio.editor.remove_region(studio.region)
         elif which == "Clear":
-            studio.desk.paint(REFERENCE, studio.region, np.zeros_like(mask))
+            studio.editor.paint(REFERENCE, studio.region, np.zeros_like(mask))
         else:
-            other = studio.desk.body(REFERENCE).canvas.mirrored(mask)
-            studio.desk.paint(REFERENCE, studio.region, mask | other)
+            other = studio.editor.paintable(REFERENCE).canvas.mirrored(mask)
+            studio.editor.paint(REFERENCE, studio.region, mask | other)
         studio.mouse.forget()
         studio.sync()
         studio.plan()

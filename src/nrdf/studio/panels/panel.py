@@ -36,7 +36,7 @@ _HINTS = {
 
 
 @dataclass(frozen=True)
-class Said:
+class PanelEvent:
     """What a person has done in the panel: in which browser, and the value that was set."""
 
     client: viser.ClientHandle
@@ -102,9 +102,9 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(440)
         self.next = gui.add_markdown("")
-        self._trouble = gui.add_markdown("", visible=False)
+        self._error = gui.add_markdown("", visible=False)
         self.working = Activity(gui, lambda: studio.worker.cancel())
-        self.driving = Activity(gui, lambda: studio.trial.worker.cancel())
+        self.driving = Activity(gui, lambda: studio.arm_simulation.worker.cancel())
         self.tool = gui.add_button_group("Mouse", TOOLS)
         self.hint = gui.add_markdown("")
         self.region = gui.add_dropdown(
@@ -128,14 +128,14 @@ class Panel:
         )  # fmt: skip
         self.on(self.tool.on_click, lambda said: self._take(said.value))
         self.on(self.region.on_update, lambda said: self._choose(said.value))
-        keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[Said], None]], ...] = (
+        keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[PanelEvent], None]], ...] = (
             ("Undo", "Z", self.undo), ("Redo", "Y", self.redo),
         )  # fmt: skip
         for label, hotkey, act in keys:
             command = gui.add_command(label, hotkey=hotkey, modifier="cmd/ctrl")
             self.on(command.on_trigger, act)
 
-    def on(self, register: Callable[..., Any], act: Callable[[Said], None]) -> None:
+    def on(self, register: Callable[..., Any], act: Callable[[PanelEvent], None]) -> None:
         """Let a person's click or change call `act`, one after another in the order in which they
         came; not a value that the program sets."""
 
@@ -143,24 +143,24 @@ class Panel:
         async def answer(event: Any) -> None:
             if event.client is None:
                 return
-            said = Said(event.client, getattr(event.target, "value", None))
+            said = PanelEvent(event.client, getattr(event.target, "value", None))
             self._unheard[id(event.target)] += 1
             self._acts.submit(self._answer, act, said, id(event.target))
 
         register(answer)
 
-    def _answer(self, act: Callable[[Said], None], said: Said, handle: int) -> None:
-        with self.studio.answering():
+    def _answer(self, act: Callable[[PanelEvent], None], said: PanelEvent, handle: int) -> None:
+        with self.studio.reporting_errors():
             self._unheard[handle] -= 1
             act(said)
 
-    def put(self, handle: Any, value: Any) -> None:
+    def set_value(self, handle: Any, value: Any) -> None:
         """Show a value in an input, unless a person has just set it to another."""
         if not self._unheard[id(handle)]:
             handle.value = value
 
     @staticmethod
-    def offer(handle: Any, options: tuple[str, ...]) -> None:
+    def set_options(handle: Any, options: tuple[str, ...]) -> None:
         """Let a dropdown have these options."""
         if handle.options != options:
             handle.options = options
@@ -168,33 +168,33 @@ class Panel:
     def refresh(self) -> None:
         """Show what the document, the plans and the results say."""
         studio = self.studio
-        names = [region.name for region in studio.desk.document.regions]
+        names = [region.name for region in studio.editor.document.regions]
         with studio.server.atomic():
-            self.offer(self.region, tuple(names) or (NO_REGION,))
-            self.put(self.region, studio.region or NO_REGION)
+            self.set_options(self.region, tuple(names) or (NO_REGION,))
+            self.set_value(self.region, studio.region or NO_REGION)
             self.next.content = f"**Next:** {self._what_is_next()}"
             tool = studio.mouse.tool
             self.hint.content = f"In your hand: **{tool}**. {_HINTS[tool]}"
             for tab in self._tabs:
                 tab.refresh()
 
-    def trouble(self, said: str) -> None:
+    def show_error(self, said: str) -> None:
         """What went wrong last, or nothing."""
-        if self._trouble.content != said:
-            self._trouble.content = said
-            self._trouble.visible = bool(said)
+        if self._error.content != said:
+            self._error.content = said
+            self._error.visible = bool(said)
 
     def undo(self, _: Any = None) -> None:
         """Take the last change back."""
-        self._go(self.studio.desk.session.undo(), "undo")
+        self._go(self.studio.editor.session.undo(), "undo")
 
     def redo(self, _: Any = None) -> None:
         """Make the change again that was taken back."""
-        self._go(self.studio.desk.session.redo(), "redo")
+        self._go(self.studio.editor.session.redo(), "redo")
 
     def _go(self, went: bool, what: str) -> None:
         if not went:
-            self.studio.tell("Nothing", f"there is nothing to {what}", bad=False)
+            self.studio.notify("Nothing", f"there is nothing to {what}", bad=False)
             return
         self.studio.mouse.forget()
         self.studio.sync()
@@ -213,7 +213,7 @@ class Panel:
 
     def _what_is_next(self) -> str:
         studio = self.studio
-        document = studio.desk.document
+        document = studio.editor.document
         if document.reference is None:
             return "open an object in **1 Object**."
         if not document.regions:
@@ -226,10 +226,16 @@ class Panel:
                 f"click on to let **{studio.region}** grow, or press *New region* for another "
                 "place; say what is done to each in **3 Process**; then go to **4 Targets**."
             )
-        waiting = [key for key in studio.desk.objects()[1:] if not studio.bench.is_current(key)]
+        waiting = [
+            key for key in studio.editor.object_keys()[1:] if not studio.results.is_current(key)
+        ]
         if waiting:
             return f"in **4 Targets**, press *Bring the process there* ({', '.join(waiting)})."
-        doubtful = [key for key in studio.desk.objects()[1:] if studio.bench.results[key].doubtful]
-        if doubtful:
-            return f"look at {', '.join(doubtful)}: some regions are in doubt; paint them right."
+        uncertain = [
+            key
+            for key in studio.editor.object_keys()[1:]
+            if studio.results.by_target[key].uncertain_regions
+        ]
+        if uncertain:
+            return f"look at {', '.join(uncertain)}: some regions are in doubt; paint them right."
         return "save what you need in **5 Save**, or see it on an arm in **6 Robot**."

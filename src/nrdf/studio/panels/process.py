@@ -10,10 +10,10 @@ import numpy as np
 
 from nrdf.process.new_knowledge import KINDS
 from nrdf.reports.transfer_report import short_metric_cells
-from nrdf.studio.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
+from nrdf.studio.model.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
 
 if TYPE_CHECKING:
-    from nrdf.studio.panels.panel import Panel, Said
+    from nrdf.studio.panels.panel import Panel, PanelEvent
 
 _LABELS = {
     "stepover_mm": ("Between lines, mm", "stepover_mm: distance between neighbouring lines"),
@@ -37,7 +37,7 @@ class ProcessTab:
         self.panel, self.studio = panel, panel.studio
         gui = self.studio.server.gui
         gui.add_markdown("Say what is done to the region; the tool path is drawn at once.")
-        self.told = gui.add_markdown("")
+        self.status = gui.add_markdown("")
         self.kind = gui.add_dropdown(
             "What is done", KINDS, hint="Choosing one fills in sensible values."
         )
@@ -59,7 +59,7 @@ class ProcessTab:
             for name in rest:
                 if name not in self.numbers:
                     self.numbers[name] = self._number(name)
-            self.tool_room = gui.add_number(
+            self.tool_clearance = gui.add_number(
                 "Room the tool needs, mm", 0.0, step=1.0,
                 hint="Free before the surface; places with less are left out. 0: not looked at.",
             )  # fmt: skip
@@ -72,45 +72,50 @@ class ProcessTab:
         panel.on(self.longest.on_click, lambda _: self._change(direction=None))
         panel.on(self.tool.on_update, lambda _: self._tool())
         panel.on(self.tool_radius.on_update, lambda _: self._tool())
-        panel.on(self.tool_room.on_update, lambda _: self._tool())
+        panel.on(self.tool_clearance.on_update, lambda _: self._tool())
         panel.on(self.step.on_update, lambda said: self._step(said.value))
         panel.on(self.steps.on_click, lambda said: self._steps(said.value))
 
     def refresh(self) -> None:
         """The step that is described now, and its plan."""
         studio = self.studio
-        region = studio.desk.document.region(studio.region)
+        region = studio.editor.document.region(studio.region)
         if region is None:
-            self.told.content = "Paint a region in step 2 first."
+            self.status.content = "Paint a region in step 2 first."
             return
         step = region.steps[studio.step]
-        self.panel.put(self.kind, str(step["kind"]))
+        self.panel.set_value(self.kind, str(step["kind"]))
         pattern = str(step.get("trajectory", "raster"))
-        self.panel.offer(self.pattern, PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern))
-        self.panel.put(self.pattern, pattern)
+        self.panel.set_options(
+            self.pattern, PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern)
+        )
+        self.panel.set_value(self.pattern, pattern)
         for name, value in shown_numbers(step).items():
-            self.panel.put(self.numbers[name], value)
-        self.panel.put(self.tool, str(step["tool"].get("name", "tool")))
-        for handle, length in ((self.tool_radius, "radius_m"), (self.tool_room, "clearance_m")):
-            self.panel.put(handle, float(f"{1e3 * step['tool'].get(length, 0.0):.6g}"))
+            self.panel.set_value(self.numbers[name], value)
+        self.panel.set_value(self.tool, str(step["tool"].get("name", "tool")))
+        for handle, length in (
+            (self.tool_radius, "radius_m"),
+            (self.tool_clearance, "clearance_m"),
+        ):
+            self.panel.set_value(handle, float(f"{1e3 * step['tool'].get(length, 0.0):.6g}"))
         names = tuple(f"{i + 1}: {s.get('name', s['kind'])}" for i, s in enumerate(region.steps))
-        self.panel.offer(self.step, names)
-        self.panel.put(self.step, names[studio.step])
+        self.panel.set_options(self.step, names)
+        self.panel.set_value(self.step, names[studio.step])
         direction = step.get("direction")
         self.direction.content = (
             "Lines run along the region's longest way; take *Arrow* and drag to say otherwise."
             if direction is None
             else f"Lines run along ({', '.join(f'{x:.2f}' for x in direction)}): the arrow."
         )
-        self.told.content = self._plan()
+        self.status.content = self._plan()
 
     def _plan(self) -> str:
         studio = self.studio
-        region = studio.desk.document.region(studio.region)
+        region = studio.editor.document.region(studio.region)
         assert region is not None
         if not region.mask.any():
             return f"**{region.name}** has no points yet."
-        plan = studio.bench.plan(region, studio.step)
+        plan = studio.results.plan(region, studio.step)
         if plan is None:
             return "*planning …*"
         if plan.fault or plan.checked is None or plan.checked.measures is None:
@@ -131,33 +136,33 @@ class ProcessTab:
         label, hint = _LABELS[name]
         return self.studio.server.gui.add_number(label, 0.0, step=_increment(name), hint=hint)
 
-    def _number_set(self, name: str, said: Said) -> None:
+    def _number_set(self, name: str, said: PanelEvent) -> None:
         self.studio.need_region()
         value = float(said.value)
         if not np.isfinite(value):
             return
-        self.studio.desk.change_numbers(self.studio.region, self.studio.step, {name: value})
+        self.studio.editor.change_numbers(self.studio.region, self.studio.step, {name: value})
         self._changed()
 
     def _kind(self, kind: str) -> None:
         self.studio.need_region()
-        self.studio.desk.restart_step(self.studio.region, self.studio.step, kind)
+        self.studio.editor.restart_step(self.studio.region, self.studio.step, kind)
         self._changed()
 
     def _change(self, **content: object) -> None:
         self.studio.need_region()
-        self.studio.desk.change_step(self.studio.region, self.studio.step, **content)
+        self.studio.editor.change_step(self.studio.region, self.studio.step, **content)
         self._changed()
 
     def _tool(self) -> None:
         self.studio.need_region()
-        region = self.studio.desk.document.region(self.studio.region)
+        region = self.studio.editor.document.region(self.studio.region)
         assert region is not None
         tool = dict(region.steps[self.studio.step]["tool"])
         tool |= {
             "name": self.tool.value,
             "radius_m": self.tool_radius.value / 1e3,
-            "clearance_m": self.tool_room.value / 1e3,
+            "clearance_m": self.tool_clearance.value / 1e3,
         }
         self._change(tool=tool)
 
@@ -170,9 +175,9 @@ class ProcessTab:
         studio = self.studio
         studio.need_region()
         if which == "Add one":
-            studio.step = studio.desk.add_step(studio.region, self.kind.value)
+            studio.step = studio.editor.add_step(studio.region, self.kind.value)
         else:
-            studio.desk.remove_step(studio.region, studio.step)
+            studio.editor.remove_step(studio.region, studio.step)
             studio.step = max(studio.step - 1, 0)
         self._changed()
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from nrdf.export.registry import FORMATS
 from nrdf.reports.job_folder import PAGE
-from nrdf.studio.result_cache import Result
-from nrdf.studio.saving import save_job, save_knowledge, save_picture, save_programs, zipped
+from nrdf.studio.model.result_cache import TargetResult
+from nrdf.studio.model.saving import save_job, save_knowledge, save_picture, save_programs, zipped
 
 if TYPE_CHECKING:
-    from nrdf.studio.panels.panel import Panel, Said
-    from nrdf.studio.worker import Progress
+    from nrdf.studio.model.worker import Progress
+    from nrdf.studio.panels.panel import Panel, PanelEvent
 
 NO_TARGET = "(none yet)"
 
@@ -31,7 +31,7 @@ class SaveTab:
         self.page = gui.add_button("Report as one page")
         self.format = gui.add_dropdown("Robot format", tuple(FORMATS), initial_value="urscript")
         self.programs = gui.add_button("Robot programs of this target")
-        self.told = gui.add_markdown("")
+        self.status = gui.add_markdown("")
         panel.on(self.knowledge.on_click, self._knowledge)
         panel.on(self.picture.on_click, self._picture)
         panel.on(self.job.on_click, lambda said: self._job(said, page=False))
@@ -40,30 +40,34 @@ class SaveTab:
 
     def refresh(self) -> None:
         """Which targets there are."""
-        keys = [key for key in self.studio.desk.objects()[1:] if key in self.studio.bench.results]
-        self.panel.offer(self.target, tuple(keys) or (NO_TARGET,))
+        keys = [
+            key
+            for key in self.studio.editor.object_keys()[1:]
+            if key in self.studio.results.by_target
+        ]
+        self.panel.set_options(self.target, tuple(keys) or (NO_TARGET,))
 
-    def _knowledge(self, said: Said) -> None:
-        place = save_knowledge(self.studio.desk)
+    def _knowledge(self, said: PanelEvent) -> None:
+        place = save_knowledge(self.studio.editor)
         said.client.send_file_download("knowledge.zip", zipped(place), save_immediately=True)
         self._tell(place, f"nrdf knowledge check {next(place.glob('*.yaml'))}")
 
-    def _picture(self, said: Said) -> None:
+    def _picture(self, said: PanelEvent) -> None:
         def work(progress: Progress) -> None:
             progress(0, 1)
-            place = save_picture(self.studio.desk, self.studio.bench)
+            place = save_picture(self.studio.editor, self.studio.results)
             content = place.read_bytes()
             said.client.send_file_download("nrdf.png", content, save_immediately=True)
             self._tell(place)
 
         self.studio.worker.submit("save", "drawing the picture", work)
 
-    def _job(self, said: Said, page: bool) -> None:
+    def _job(self, said: PanelEvent, page: bool) -> None:
         name, result = self._chosen()
 
         def work(progress: Progress) -> None:
             progress(0, 1)
-            place = save_job(self.studio.desk, name, result, self.studio.origin)
+            place = save_job(self.studio.editor, name, result, self.studio.origin)
             if page:
                 content, file = (place / PAGE).read_bytes(), f"{name}.html"
             else:
@@ -73,18 +77,18 @@ class SaveTab:
 
         self.studio.worker.submit("save", "writing the job and its pictures", work)
 
-    def _programs(self, said: Said) -> None:
+    def _programs(self, said: PanelEvent) -> None:
         name, result = self._chosen()
-        place = save_programs(self.studio.desk, name, result, (self.format.value,))
+        place = save_programs(self.studio.editor, name, result, (self.format.value,))
         file = f"{name}-{self.format.value}.zip"
         said.client.send_file_download(file, zipped(place), save_immediately=True)
         self._tell(place)
 
-    def _chosen(self) -> tuple[str, Result]:
+    def _chosen(self) -> tuple[str, TargetResult]:
         name = self.target.value
-        return name, self.studio.bench.ready(name)
+        return name, self.studio.results.ready(name)
 
     def _tell(self, place: Path, command: str = "") -> None:
         lines = [f"Written to `{place}`."]
         lines += [f"From here: `{command}`"] if command else []
-        self.told.content = "  \n".join(lines)
+        self.status.content = "  \n".join(lines)

@@ -8,9 +8,9 @@ from nrdf.errors import NrdfError
 from nrdf.geometry.units import METRES
 from nrdf.process.limits import LOW_CONFIDENCE, Limits
 from nrdf.reports.transfer_report import report_of, shares_in_words
-from nrdf.studio.colours import COLOURINGS
+from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.object import AS_IN_FILE, unit_of
-from nrdf.studio.uploads import BUNDLED, ENDINGS, bundled
+from nrdf.studio.scene.colours import COLOURINGS
 
 if TYPE_CHECKING:
     from nrdf.studio.panels.panel import Panel
@@ -30,7 +30,7 @@ class TargetsTab:
         self.unit = gui.add_dropdown("A file's unit", (AS_IN_FILE, *METRES))
         self.upload = gui.add_upload_button("Add a file …", mime_type=",".join(ENDINGS))
         self.bring = gui.add_button("Bring the process there", color="green")
-        self.told = gui.add_markdown("")
+        self.status = gui.add_markdown("")
         self.shown = gui.add_dropdown("Beside the reference", (ALL,))
         self.colours = gui.add_dropdown(
             "Colours", COLOURINGS,
@@ -52,19 +52,19 @@ class TargetsTab:
     def refresh(self) -> None:
         """Every target's result."""
         studio = self.studio
-        keys = studio.desk.objects()[1:]
-        self.panel.offer(self.shown, (ALL, *keys))
-        self.panel.put(self.shown, studio.beside if studio.beside in keys else ALL)
-        self.panel.put(self.colours, studio.colouring)
-        self.told.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."
+        keys = studio.editor.object_keys()[1:]
+        self.panel.set_options(self.shown, (ALL, *keys))
+        self.panel.set_value(self.shown, studio.beside if studio.beside in keys else ALL)
+        self.panel.set_value(self.colours, studio.colouring)
+        self.status.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."
 
     def _about(self, key: str) -> str:
         studio = self.studio
-        result = studio.bench.results.get(key)
+        result = studio.results.by_target.get(key)
         if result is None:
             return f"**{key}**: waits for *Bring the process there*."
-        report = report_of(result.transferred, Limits())
-        old = "" if studio.bench.is_current(key) else " *(of before your last change)*"
+        report = report_of(result.transfer_result, Limits())
+        old = "" if studio.results.is_current(key) else " *(of before your last change)*"
         minutes, seconds = divmod(round(report["total"]["cycle_time_s"]), 60)
         count = report["total"]["paths"]
         paths = "1 tool path" if count == 1 else f"{count} tool paths"
@@ -88,26 +88,26 @@ class TargetsTab:
 
     def _load(self, file: Any) -> None:
         self._need_reference()
-        category, unit = self.studio.desk.document.category, unit_of(self.unit.value)
+        category, unit = self.studio.editor.document.category, unit_of(self.unit.value)
         self.studio.read(file, category, unit, lambda cloud: self._added(file.name, cloud))
 
     def _need_reference(self) -> None:
-        if self.studio.desk.document.reference is None:
+        if self.studio.editor.document.reference is None:
             raise NrdfError("there is no reference yet: open one in step 1 first")
 
     def _added(self, name: str, cloud: Any) -> None:
         self._need_reference()
-        self.studio.desk.add_target(name, cloud)
+        self.studio.editor.add_target(name, cloud)
         self.studio.beside = None
         self.studio.sync()
 
     def _bring(self) -> None:
-        if not self.studio.desk.document.targets:
+        if not self.studio.editor.document.targets:
             raise NrdfError("there is no target yet: add one above")
-        regions = self.studio.desk.document.regions
+        regions = self.studio.editor.document.regions
         bare = ", ".join(region.name for region in regions if not region.mask.any())
         if bare and any(region.mask.any() for region in regions):
-            self.studio.tell(
+            self.studio.notify(
                 "Left out", f"{bare}: no points yet; paint them in step 2, or delete them there"
             )
         self.studio.transfer()
@@ -121,15 +121,15 @@ class TargetsTab:
 
     def _more(self, which: str) -> None:
         key = self.studio.beside
-        keys = self.studio.desk.objects()[1:]
+        keys = self.studio.editor.object_keys()[1:]
         if key is None and len(keys) == 1:
             key = keys[0]
         if key is None or key not in keys:
             raise NrdfError("choose a target under 'Beside the reference' first")
         if which == "Remove":
-            self.studio.desk.remove_target(key)
+            self.studio.editor.remove_target(key)
             self.studio.beside = None
         else:
-            self.studio.desk.forget_corrections(key)
+            self.studio.editor.forget_corrections(key)
             self.studio.transfer()
         self.studio.sync()

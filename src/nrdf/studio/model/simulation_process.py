@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nrdf.errors import RobotError
-from nrdf.studio.separate import Separate, answer, progress_of
-from nrdf.studio.worker import Progress
+from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
+from nrdf.studio.model.worker import Progress
 
 if TYPE_CHECKING:
-    from nrdf.studio.playback import Playback
+    from nrdf.studio.model.playback import Playback
 
 
-def need_engine() -> None:
+def require_mujoco() -> None:
     """Raises RobotError, with the line that installs it, where there is no MuJoCo."""
     if find_spec("mujoco") is None:
         raise RobotError(
@@ -26,16 +26,16 @@ def need_engine() -> None:
         )
 
 
-class Simulator:
+class SimulationProcess:
     """A process that drives one job on an arm: the bundled one, or that of a file."""
 
     def __init__(self, job: Path, robot: Path | None = None, tool_frame: str | None = None) -> None:
-        self._separate = Separate(_serve, (job, robot, tool_frame), _gone)
+        self._child = ChildProcess(_serve, (job, robot, tool_frame), _gone)
 
     def drive(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
         """Wait for the simulation; `say` is told what is being done. Raises RobotError and
         ProcessError as `nrdf simulate` does, and what `progress` raises."""
-        made: Playback = self._separate.wait(progress, say)
+        made: Playback = self._child.wait(progress, say)
         return made
 
     def write(
@@ -43,12 +43,12 @@ class Simulator:
     ) -> dict[str, Any]:
         """Write what `nrdf simulate` writes into a folder that appears whole or not at all; what
         its report.json says. Raises OutputError, and what `progress` raises."""
-        made: dict[str, Any] = self._separate.ask((folder, title, dict(origin)), progress)
+        made: dict[str, Any] = self._child.ask((folder, title, dict(origin)), progress)
         return made
 
     def end(self) -> None:
         """End the process; what it has written half is removed. Who waits for it is cancelled."""
-        self._separate.end()
+        self._child.end()
 
 
 def _gone(why: str) -> RobotError:
@@ -74,7 +74,7 @@ def _simulate(
     from nrdf.robot.model.arm import load_arm
     from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.robot.simulation.simulate import simulate
-    from nrdf.studio.playback import playback_of
+    from nrdf.studio.model.playback import playback_of
 
     work = read_simulation_job(job)
     seen: list[str] = []

@@ -13,26 +13,26 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf.errors import OutputError, ProcessError, RegionError
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.knowledge_file import read_knowledge
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.editor import Desk
-from nrdf.studio.saving import place_of
-from nrdf.studio.session import Session
-from nrdf.studio.session_file import FILE
-from nrdf.studio.teaching import lesson_of, process_of, shown_numbers
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.saving import place_of
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.session_file import FILE
+from nrdf.studio.model.teaching import bound_knowledge_of, process_of, shown_numbers
 
 
 @pytest.fixture
-def desk(tmp_path):
-    made = Desk(Session(tmp_path / "session"))
+def editor(tmp_path):
+    made = Editor(Session(tmp_path / "session"))
     made.open_reference("box.ply", cloud(), "chair")
     return made
 
 
 @pytest.fixture
-def painted(desk):
-    desk.add_region("top")
-    desk.paint(REFERENCE, "top", face(cloud(), "top"))
-    return desk
+def painted(editor):
+    editor.add_region("top")
+    editor.paint(REFERENCE, "top", face(cloud(), "top"))
+    return editor
 
 
 def face(of, name):
@@ -42,16 +42,16 @@ def face(of, name):
     return mask
 
 
-def again(desk):
+def again(editor):
     """The session as the program finds it when it is started again."""
-    return Session(desk.session.folder)
+    return Session(editor.session.folder)
 
 
 def test_everything_is_there_after_a_crash(painted):
     painted.recolour_region("top", (1, 2, 3))
     painted.change_numbers("top", 0, {"stepover_mm": 12.0, "force_n": 0.0})
     painted.add_target("other.ply", cloud(SIZE, seed=1))
-    mask = face(painted.body("other").cloud, "front")
+    mask = face(painted.paintable("other").cloud, "front")
     painted.paint("other", "top", mask)
     kept = again(painted).document
     assert kept.category == "chair" and kept.reference.name == "box.ply"
@@ -87,8 +87,8 @@ def test_clouds_that_nothing_needs_any_more_go_when_it_starts_again(painted):
 
 def test_starting_anew_can_be_undone(painted):
     painted.start_anew()
-    assert painted.objects() == [] and again(painted).document.reference is None
-    assert painted.session.undo() and painted.objects() == [REFERENCE]
+    assert painted.object_keys() == [] and again(painted).document.reference is None
+    assert painted.session.undo() and painted.object_keys() == [REFERENCE]
 
 
 @pytest.mark.parametrize(
@@ -173,12 +173,12 @@ def test_names_of_regions(painted):
 
 def test_corrections_follow_their_region(painted):
     painted.add_target("other.ply", cloud(SIZE, seed=1))
-    painted.paint("other", "top", face(painted.body("other").cloud, "top"))
+    painted.paint("other", "top", face(painted.paintable("other").cloud, "top"))
     painted.rename_region("top", "lid")
     assert list(painted.target("other").corrected) == ["lid"]
     painted.forget_corrections("other")
     assert not painted.target("other").corrected
-    painted.paint("other", "lid", face(painted.body("other").cloud, "top"))
+    painted.paint("other", "lid", face(painted.paintable("other").cloud, "top"))
     painted.remove_region("lid")
     assert not painted.target("other").corrected
 
@@ -189,7 +189,7 @@ def test_names_of_targets_are_no_paths_and_differ(painted):
     files = sorted(p.name for p in (painted.session.folder / "clouds").iterdir())
     assert files == ["cloud-1.ply", "cloud-2.ply", "cloud-3.ply"]
     painted.remove_target("passwd")
-    assert painted.objects() == [REFERENCE, "passwd-2"]
+    assert painted.object_keys() == [REFERENCE, "passwd-2"]
 
 
 def test_overlaps_are_told(painted):
@@ -197,9 +197,9 @@ def test_overlaps_are_told(painted):
     painted.paint(REFERENCE, "front", painted.document.region("top").mask)
     assert "top" in painted.shared()[0] and "front" in painted.shared()[0]
     with pytest.raises(ProcessError, match="overlap"):
-        lesson_of(painted.session.clouds, painted.document)
+        bound_knowledge_of(painted.session.clouds, painted.document)
     painted.allow_overlap(True)
-    assert len(lesson_of(painted.session.clouds, painted.document).regions) == 2
+    assert len(bound_knowledge_of(painted.session.clouds, painted.document).regions) == 2
 
 
 def test_steps(painted):
@@ -243,25 +243,25 @@ def test_wrong_numbers_are_named_by_field_and_value(painted, shown, message):
 
 
 def test_knowledge_needs_a_reference_and_a_region(tmp_path):
-    desk = Desk(Session(tmp_path / "session"))
+    editor = Editor(Session(tmp_path / "session"))
     with pytest.raises(ProcessError, match="step 1"):
-        lesson_of(desk.session.clouds, desk.document)
-    desk.open_reference("box.ply", cloud(), "chair")
-    desk.add_region()
+        bound_knowledge_of(editor.session.clouds, editor.document)
+    editor.open_reference("box.ply", cloud(), "chair")
+    editor.add_region()
     with pytest.raises(ProcessError, match="step 2"):
-        lesson_of(desk.session.clouds, desk.document)
+        bound_knowledge_of(editor.session.clouds, editor.document)
 
 
 def test_knowledge_goes_out_and_comes_back(painted, tmp_path):
-    from nrdf.studio.saving import save_knowledge
+    from nrdf.studio.model.saving import save_knowledge
 
     painted.change_step("top", 0, parameters={"grit": 120})
     place = save_knowledge(painted)
     assert save_knowledge(painted) == place, "it can be saved again"
     lesson = read_bound_knowledge(place / "chair.yaml")
     assert read_knowledge(place / "chair.yaml").regions[0].processes[0].parameters["grit"] == 120
-    other = Desk(Session(tmp_path / "other"))
-    other.open_lesson("reference", lesson)
+    other = Editor(Session(tmp_path / "other"))
+    other.open_knowledge("reference", lesson)
     (region,) = other.document.regions
     assert (region.mask == painted.document.regions[0].mask).all()
     (step,), (made,) = region.steps, painted.document.regions[0].steps

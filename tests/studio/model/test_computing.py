@@ -18,13 +18,13 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf.errors import CloudError
 from nrdf.io.cloud import write_cloud
 from nrdf.studio.app import Studio
-from nrdf.studio.computing import Computing, SeparateComputing
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.editor import Desk
-from nrdf.studio.result_cache import Bench
+from nrdf.studio.model.computing import ChildProcessComputing, LocalComputing
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.worker import Cancelled
 from nrdf.studio.serving import open_server
-from nrdf.studio.session import Session
-from nrdf.studio.worker import Cancelled
 
 
 def load(weights, deadly, category):
@@ -38,15 +38,15 @@ def silent(done, total):
     """Progress that nobody looks at."""
 
 
-def painted_desk(folder):
-    desk = Desk(Session(folder))
-    desk.open_reference("box.ply", cloud(), "chair")
-    desk.add_region("top")
+def painted_editor(folder):
+    editor = Editor(Session(folder))
+    editor.open_reference("box.ply", cloud(), "chair")
+    editor.add_region("top")
     mask = np.zeros(len(cloud()), bool)
     mask[faces(cloud())["top"]] = True
-    desk.paint(REFERENCE, "top", mask)
-    desk.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
-    return desk
+    editor.paint(REFERENCE, "top", mask)
+    editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+    return editor
 
 
 @pytest.fixture
@@ -56,39 +56,41 @@ def deadly(tmp_path):
 
 @pytest.fixture
 def separate(untrained, deadly):
-    made = SeparateComputing(partial(load, untrained, deadly))
+    made = ChildProcessComputing(partial(load, untrained, deadly))
     yield made
     made.end()
 
 
 def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
     """One process for all that it does: starting it takes seconds."""
-    desk = painted_desk(tmp_path / "s")
-    here = Bench(desk, Computing(lambda category: nrdf.load_model(untrained)))
-    there = Bench(desk, separate)
-    document, shares = desk.document, []
-    for bench in (here, there):
-        bench.make_plans(document, silent)
-        bench.transfer(document, lambda done, total: shares.append(done / total))
+    editor = painted_editor(tmp_path / "s")
+    here = ResultCache(editor, LocalComputing(lambda category: nrdf.load_model(untrained)))
+    there = ResultCache(editor, separate)
+    document, shares = editor.document, []
+    for results in (here, there):
+        results.make_plans(document, silent)
+        results.transfer(document, lambda done, total: shares.append(done / total))
     (region,) = document.regions
     one, other = here.plan(region, 0), there.plan(region, 0)
     assert other.checked.measures == one.checked.measures and not other.fault
-    one, other = (bench.results["new"].transferred for bench in (here, there))
+    one, other = (results.by_target["new"].transfer_result for results in (here, there))
     assert [p.measures for p in other.paths] == [p.measures for p in one.paths]
     assert there.is_current("new") and max(shares) > 0.0
-    one, other = (bench.described(document, silent).unlike(17) for bench in (here, there))
+    one, other = (results.described(document, silent).distances(17) for results in (here, there))
     np.testing.assert_allclose(other["new"], one["new"], atol=1e-6)
-    desk.change_numbers("top", 0, {"stepover_mm": 35.0})
+    editor.change_numbers("top", 0, {"stepover_mm": 35.0})
     assert not there.is_current("new")
 
     def give_up(done, total):
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        there.transfer(desk.document, give_up)
-    desk.change_numbers("top", 0, {"stepover_mm": 20.0})
-    there.transfer(desk.document, silent)
-    taught = there.results["new"].transferred.bound_knowledge.knowledge.regions[0].processes[0]
+        there.transfer(editor.document, give_up)
+    editor.change_numbers("top", 0, {"stepover_mm": 20.0})
+    there.transfer(editor.document, silent)
+    taught = (
+        there.by_target["new"].transfer_result.bound_knowledge.knowledge.regions[0].processes[0]
+    )
     assert taught.stepover_m == 0.02, "what was changed after it was given up"
 
     write_cloud(tmp_path / "box.ply", cloud())
@@ -100,29 +102,29 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
 
 
 def test_a_studio_outlives_what_computes_and_opens_again(tmp_path, separate, deadly):
-    painted_desk(tmp_path / "s")
+    painted_editor(tmp_path / "s")
     deadly.touch()
     server = open_server("127.0.0.1", 8490)
     studio = Studio(Session(tmp_path / "s"), server, separate, ["chair"], {})
     try:
         assert studio.worker.wait(120)
         died = "has ended by itself (signal 11, Segmentation fault)"
-        until(lambda: died in studio.panel._trouble.content)
+        until(lambda: died in studio.panel._error.content)
         time.sleep(0.5)
         assert not studio.worker.busy, "it does not try again by itself"
-        assert studio.bench.plan(studio.desk.document.regions[0], 0).lines, "planned before"
+        assert studio.results.plan(studio.editor.document.regions[0], 0).lines, "planned before"
         assert Session(tmp_path / "s").document.regions, "nothing is lost"
         deadly.unlink()
-        with studio.answering():
+        with studio.reporting_errors():
             studio.panel.targets._load(
                 SimpleNamespace(name="more.xyz", content=b"1 2 3\n" * 9),  # refused, in the process
             )
         assert studio.worker.wait(120)
-        until(lambda: "more.xyz" in studio.panel._trouble.content)
-        with studio.answering():
+        until(lambda: "more.xyz" in studio.panel._error.content)
+        with studio.reporting_errors():
             studio.transfer()
         assert studio.worker.wait(120)
-        assert studio.bench.is_current("new")
+        assert studio.results.is_current("new")
     finally:
         studio.stop()
         server.stop()

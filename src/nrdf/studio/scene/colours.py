@@ -53,13 +53,12 @@ def confidence_colours(count: int, regions: Sequence[tuple[np.ndarray, np.ndarra
     return drawn.astype(np.uint8)
 
 
-def likeness_colours(unlikeness: np.ndarray, width: float) -> np.ndarray:
+def similarity_colours(distance: np.ndarray, width: float) -> np.ndarray:
     """Colours (n, 3) uint8 by how alike descriptors are: yellow where the same, blue where not.
 
-    unlikeness: (n,) as `nrdf.studio.computing.Described.unlike` gives it; width: at which likeness
-    has fallen to 1/e.
+    distance: (n,) descriptor distances; width: the distance at which the similarity is 1/e.
     """
-    alike = np.exp(-((unlikeness / max(width, 1e-6)) ** 2))[:, None]
+    alike = np.exp(-((distance / max(width, 1e-6)) ** 2))[:, None]
     return (_COLD + alike * (_HOT - _COLD)).astype(np.uint8)
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from nrdf.errors import OutputError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.io.locks import remove_partial_files
-from nrdf.studio.document import Document, Loaded
-from nrdf.studio.session_file import (
+from nrdf.studio.model.document import Document, LoadedObject
+from nrdf.studio.model.session_file import (
     CLOUDS,
     FILE,
     NewerSession,
@@ -76,12 +76,12 @@ class Session:
         """Take the last undoing back; whether there was one."""
         return self._go(self._undone, self._done)
 
-    def store(self, name: str, cloud: PointCloud) -> Loaded:
+    def store(self, name: str, cloud: PointCloud) -> LoadedObject:
         """Write a cloud, in metres, into the session's folder, to be put into a document."""
         taken = [int(p.stem.split("-")[1]) for p in (self.folder / CLOUDS).glob("cloud-*.ply")]
         file = f"cloud-{max(taken, default=0) + 1}.ply"
         write_cloud(self.folder / CLOUDS / file, cloud)
-        return Loaded(name, cloud, file)
+        return LoadedObject(name, cloud, file)
 
     def save(self) -> None:
         """Write the document, all of it or nothing."""
@@ -92,7 +92,7 @@ class Session:
         """The folder of the objects' clouds."""
         return self.folder / CLOUDS
 
-    def path_of(self, loaded: Loaded) -> Path:
+    def path_of(self, loaded: LoadedObject) -> Path:
         """The file of an object's cloud."""
         return self.folder / CLOUDS / loaded.file
 

@@ -15,17 +15,17 @@ from nrdf.io.cloud import PointCloud
 from nrdf.io.file_names import safe_file_name
 from nrdf.process.bound_knowledge import BoundKnowledge, overlaps
 from nrdf.regions.region import region_name_fault
-from nrdf.studio.colours import next_colour
-from nrdf.studio.document import REFERENCE, Document, Painted, Target
-from nrdf.studio.paintable_cloud import Body
-from nrdf.studio.session import Session
-from nrdf.studio.teaching import changed_step, new_step, painted_of
-from nrdf.studio.uploads import shown_name, to_paint_on
+from nrdf.studio.model.document import REFERENCE, Document, PaintedRegion, Target
+from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.teaching import changed_step, new_step, painted_regions_of
+from nrdf.studio.model.uploads import shown_name, thinned_reference
+from nrdf.studio.scene.colours import next_colour
 
 _FIRST_KIND = "sand"
 
 
-class Desk:
+class Editor:
     """A session, its objects ready to be painted on, and every change that can be made to it.
 
     Raises what `Session` raises.
@@ -33,22 +33,22 @@ class Desk:
 
     def __init__(self, session: Session) -> None:
         self.session = session
-        self._bodies: dict[str, tuple[PointCloud, Body]] = {}
+        self._paintables: dict[str, tuple[PointCloud, PaintableCloud]] = {}
 
     @property
     def document(self) -> Document:
         """What has been made so far."""
         return self.session.document
 
-    def body(self, key: str) -> Body:
+    def paintable(self, key: str) -> PaintableCloud:
         """The reference, or the target of that name."""
         cloud = self._cloud(key)
-        kept = self._bodies.get(key)
+        kept = self._paintables.get(key)
         if kept is None or kept[0] is not cloud:
-            kept = self._bodies[key] = (cloud, Body(cloud))
+            kept = self._paintables[key] = (cloud, PaintableCloud(cloud))
         return kept[1]
 
-    def objects(self) -> list[str]:
+    def object_keys(self) -> list[str]:
         """The objects that there are."""
         document = self.document
         first = [] if document.reference is None else [REFERENCE]
@@ -62,12 +62,12 @@ class Desk:
 
     def open_reference(self, name: str, cloud: PointCloud, category: str) -> None:
         """Begin with a reference, in metres; regions and targets of an earlier one go."""
-        loaded = self.session.store(shown_name(name), to_paint_on(cloud))
+        loaded = self.session.store(shown_name(name), thinned_reference(cloud))
         self.session.change(Document(category, loaded))
 
-    def open_lesson(self, name: str, lesson: BoundKnowledge) -> None:
+    def open_knowledge(self, name: str, lesson: BoundKnowledge) -> None:
         """Begin with what a knowledge file teaches, on its reference."""
-        small = to_paint_on(lesson.cloud)
+        small = thinned_reference(lesson.cloud)
         if len(small) < len(lesson.cloud):
             raise RegionError(
                 f"the reference has {len(lesson.cloud)} points; knowledge with more than "
@@ -78,7 +78,7 @@ class Desk:
         for region in lesson.knowledge.regions:
             colours[region.name] = next_colour(list(colours.values()))
         knowledge = lesson.knowledge
-        regions = painted_of(lesson, colours)
+        regions = painted_regions_of(lesson, colours)
         self.session.change(
             Document(knowledge.category, loaded, regions, (), knowledge.allow_overlap)
         )
@@ -109,8 +109,8 @@ class Desk:
         taken = [region.name for region in document.regions]
         name = _free(name or "region", taken, always=not name)
         colour = next_colour([region.colour for region in document.regions])
-        mask = np.zeros(len(self.body(REFERENCE).cloud), bool)
-        added = Painted(name, colour, mask, (new_step(_FIRST_KIND),))
+        mask = np.zeros(len(self.paintable(REFERENCE).cloud), bool)
+        added = PaintedRegion(name, colour, mask, (new_step(_FIRST_KIND),))
         self.session.change(replace(document, regions=(*document.regions, added)))
         return name
 
@@ -148,21 +148,21 @@ class Desk:
     def mask(self, key: str, region: str, found: np.ndarray | None = None) -> np.ndarray:
         """The shown points (k,) of an object that are in a region: as painted or corrected, or as
         `found`, indices of a target's points."""
-        body, target = self.body(key), self.target(key)
+        paintable, target = self.paintable(key), self.target(key)
         if target is None:
             painted = self.document.region(region)
-            whole = np.zeros(len(body.cloud), bool) if painted is None else painted.mask
+            whole = np.zeros(len(paintable.cloud), bool) if painted is None else painted.mask
         elif region in target.corrected:
             whole = target.corrected[region]
         else:
-            whole = np.zeros(len(body.cloud), bool)
+            whole = np.zeros(len(paintable.cloud), bool)
             whole[[] if found is None else found] = True
-        return body.to_shown(whole)
+        return paintable.to_shown(whole)
 
     def paint(self, key: str, region: str, mask: np.ndarray, merge: bool = False) -> None:
         """Let a region be these shown points (k,): on the reference, or on a target by hand."""
-        body, target = self.body(key), self.target(key)
-        whole = body.to_all(mask)
+        paintable, target = self.paintable(key), self.target(key)
+        whole = paintable.to_all(mask)
         if target is None:
             document = self.document.with_region(region, mask=whole)
         else:
@@ -222,7 +222,7 @@ class Desk:
     def _step(self, region: str, number: int) -> Mapping[str, Any]:
         return self._painted(region).steps[number]
 
-    def _painted(self, name: str) -> Painted:
+    def _painted(self, name: str) -> PaintedRegion:
         painted = self.document.region(name)
         if painted is None:
             raise RegionError("there is no region yet: make one in step 2")

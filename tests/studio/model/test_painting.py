@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from nrdf.bundled import bundled_chair
-from nrdf.studio.paintable_cloud import Body
-from nrdf.studio.view import View, hit, inside
+from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.scene.camera import Camera, hit, inside
 
 
 @pytest.fixture(scope="module")
 def chair():
     cloud, regions = bundled_chair("reference")
-    return Body(cloud), regions
+    return PaintableCloud(cloud), regions
 
 
 def middle(body, mask):
@@ -62,7 +62,7 @@ def test_the_mirror_image_is_on_the_other_side(chair):
 
 
 def test_painting_8192_points_takes_less_than_100_ms(chair):
-    from nrdf.studio.colours import painted_colours
+    from nrdf.studio.scene.colours import painted_colours
 
     body, regions = chair
     seed = middle(body, regions["seat"])
@@ -77,7 +77,7 @@ def test_painting_8192_points_takes_less_than_100_ms(chair):
 def from_the_front():
     # Looks along -X from x = 2: right is -Z, up is +Y.
     rotation = np.array([[0.0, 0, -1], [0, -1, 0], [-1, 0, 0]])
-    return View(np.array([2.0, 0.45, 0.0]), rotation, np.radians(48), 1.5)
+    return Camera(np.array([2.0, 0.45, 0.0]), rotation, np.radians(48), 1.5)
 
 
 def test_rays_and_projection_agree(from_the_front):
@@ -92,7 +92,7 @@ def test_rays_and_projection_agree(from_the_front):
 
 
 def test_quaternions_come_scalar_first():
-    view = View.of(np.zeros(3), np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)]), 1.0, 1.0)
+    view = Camera.of(np.zeros(3), np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)]), 1.0, 1.0)
     np.testing.assert_allclose(view.rotation @ [1.0, 0, 0], [0, 1, 0], atol=1e-12)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import viser
 from scipy.spatial.transform import Rotation
 
-from nrdf.studio.paintable_cloud import Body
-from nrdf.studio.view import View, hit
+from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.scene.camera import Camera, hit
 from nrdf.surface.surface import unit
 
 FOV_RAD = np.radians(48.0)
@@ -29,30 +29,32 @@ _LIGHT = np.array([0.62, 0.70, 0.35])
 _DARKEST = 0.58  # share of its colour that a point has whose side faces away from the light
 
 
-class Figure:
-    """A body on the stage: where it stands, and what is drawn of it."""
+class ObjectView:
+    """A paintable on the stage: where it stands, and what is drawn of it."""
 
-    def __init__(self, stage: Stage, key: str, number: int, body: Body) -> None:
-        self.key, self.body, self.stage = key, body, stage
+    def __init__(
+        self, scene_view: SceneView, key: str, number: int, paintable: PaintableCloud
+    ) -> None:
+        self.key, self.paintable, self.scene_view = key, paintable, scene_view
         self.path = f"/object{number}"
         self.offset, self._rotation = np.zeros(3), np.eye(3)
-        scene = stage.server.scene
+        scene = scene_view.server.scene
         self.frame = scene.add_frame(self.path, show_axes=False)
         self.points = scene.add_point_cloud(
             f"{self.path}/points",
-            (body.points * stage.factor).astype(np.float32),
-            np.full((len(body.points), 3), 200, np.uint8),
-            point_size=_SIZE * body.surface.spacing * stage.factor,
+            (paintable.points * scene_view.factor).astype(np.float32),
+            np.full((len(paintable.points), 3), 200, np.uint8),
+            point_size=_SIZE * paintable.surface.spacing * scene_view.factor,
             point_shape="circle",
             point_shading="flat",
             precision="float32",
         )
-        size = (body.high - body.low) * stage.factor
+        size = (paintable.high - paintable.low) * scene_view.factor
         # Nothing to see: what a drag that paints must begin on. Only lines, for slow renderers.
         self.ground = scene.add_box(
             f"{self.path}/ground",
             dimensions=tuple(1.02 * size),
-            position=tuple((body.low + body.high) / 2 * stage.factor),
+            position=tuple((paintable.low + paintable.high) / 2 * scene_view.factor),
             wireframe=True,
             flat_shading=False,
             opacity=0.0,
@@ -63,7 +65,7 @@ class Figure:
         self.label = scene.add_label(
             f"{self.path}/label",
             key,
-            position=tuple(self.top * stage.factor + np.array([0.0, _ABOVE, 0.0])),
+            position=tuple(self.top * scene_view.factor + np.array([0.0, _ABOVE, 0.0])),
             anchor="bottom-center",
         )
         self._lines: list[viser.SceneNodeHandle] = []
@@ -73,7 +75,10 @@ class Figure:
     def corners(self) -> np.ndarray:
         """The corners (8, 3) of the object's bounding box in the scene, room for the label above
         included."""
-        low, high = self.body.low * self.stage.factor, self.body.high * self.stage.factor
+        low, high = (
+            self.paintable.low * self.scene_view.factor,
+            self.paintable.high * self.scene_view.factor,
+        )
         high[1] += _ABOVE
         choice = np.array(list(product((False, True), repeat=3)))
         return np.where(choice, high, low) @ self._rotation.T + self.offset
@@ -81,8 +86,8 @@ class Figure:
     @property
     def top(self) -> np.ndarray:
         """The place (3,) over the object's middle, at its highest, m."""
-        middle = (self.body.low + self.body.high) / 2
-        return np.array([middle[0], self.body.high[1], middle[2]])
+        middle = (self.paintable.low + self.paintable.high) / 2
+        return np.array([middle[0], self.paintable.high[1], middle[2]])
 
     def stand(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
         """Move the object; offset (3,) in the scene, rotation (3, 3) from its own frame."""
@@ -92,7 +97,7 @@ class Figure:
 
     def paint(self, colours: np.ndarray) -> None:
         """Colours (k, 3) uint8 of the shown points, which are shaded here."""
-        facing = 0.5 + 0.5 * self.body.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
+        facing = 0.5 + 0.5 * self.paintable.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
         shade = _DARKEST + (1 - _DARKEST) * facing
         self.points.colors = (colours * shade[:, None]).astype(np.uint8)
 
@@ -112,7 +117,7 @@ class Figure:
 
     def draw_lines(self, lines: Mapping[str, tuple[Sequence[np.ndarray], np.ndarray]]) -> None:
         """Lines by name, each (arrays (m, 3), m; colour (3,)), in place of all earlier ones."""
-        scene, factor = self.stage.server.scene, self.stage.factor
+        scene, factor = self.scene_view.server.scene, self.scene_view.factor
         for handle in self._lines:
             handle.remove()
         self._lines.clear()
@@ -136,13 +141,13 @@ class Figure:
             self._arrows.pop(name).remove()
         if start is None or stop is None or np.linalg.norm(stop - start) < 1e-6:
             return
-        factor = self.stage.factor
-        lift = 2 * self.body.surface.spacing
+        factor = self.scene_view.factor
+        lift = 2 * self.paintable.surface.spacing
         ends = np.array([[start, stop]])
-        at = int(np.argmin(np.linalg.norm(self.body.points - start, axis=1)))
-        self._arrows[name] = self.stage.server.scene.add_arrows(
+        at = int(np.argmin(np.linalg.norm(self.paintable.points - start, axis=1)))
+        self._arrows[name] = self.scene_view.server.scene.add_arrows(
             f"{self.path}/{name}",
-            (ends + lift * self.body.normals[at]) * factor,
+            (ends + lift * self.paintable.normals[at]) * factor,
             (20, 20, 24),
             shaft_radius=0.008,
             head_radius=0.022,
@@ -152,34 +157,34 @@ class Figure:
     def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[int, float] | None:
         """The shown point that a ray of the scene meets first, and the depth in the scene."""
         found = hit(
-            self.body.points,
-            self.body.normals,
-            (origin - self.offset) @ self._rotation / self.stage.factor,
+            self.paintable.points,
+            self.paintable.normals,
+            (origin - self.offset) @ self._rotation / self.scene_view.factor,
             direction @ self._rotation,
-            self.body.surface.spacing,
+            self.paintable.surface.spacing,
         )
-        return None if found is None else (found[0], found[1] * self.stage.factor)
+        return None if found is None else (found[0], found[1] * self.scene_view.factor)
 
-    def view(self, view: View) -> View:
+    def view(self, view: Camera) -> Camera:
         """A camera of the scene as the object sees it, m."""
-        position = (view.position - self.offset) @ self._rotation / self.stage.factor
-        return View(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
+        position = (view.position - self.offset) @ self._rotation / self.scene_view.factor
+        return Camera(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
 
     def remove(self) -> None:
         """Take the object and all that is drawn of it away."""
         self.frame.remove()
 
     def _lifted(self, line: np.ndarray) -> np.ndarray:
-        near = self.body.surface.tree.query(line)[1]
-        return line + _LIFT * self.body.surface.spacing * self.body.surface.normals[near]
+        near = self.paintable.surface.tree.query(line)[1]
+        return line + _LIFT * self.paintable.surface.spacing * self.paintable.surface.normals[near]
 
 
-class Stage:
+class SceneView:
     """All objects. factor: scene units for a metre, such that the reference is about 1 long."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.server = server
-        self.figures: dict[str, Figure] = {}
+        self.objects: dict[str, ObjectView] = {}
         self.factor = 1.0
         self._made = 0
         server.scene.set_up_direction("+y")
@@ -187,38 +192,38 @@ class Stage:
 
     def clear(self, factor: float) -> None:
         """Take everything away."""
-        for figure in self.figures.values():
-            figure.remove()
-        self.figures.clear()
+        for object_view in self.objects.values():
+            object_view.remove()
+        self.objects.clear()
         self.factor = factor
 
-    def add(self, key: str, body: Body) -> Figure:
+    def add(self, key: str, paintable: PaintableCloud) -> ObjectView:
         """Put an object beside the others."""
         self._made += 1
-        figure = Figure(self, key, self._made, body)
-        self.figures[key] = figure
-        return figure
+        object_view = ObjectView(self, key, self._made, paintable)
+        self.objects[key] = object_view
+        return object_view
 
     def remove(self, key: str) -> None:
         """Take an object away."""
-        self.figures.pop(key).remove()
+        self.objects.pop(key).remove()
 
     def arrange(self, shown: Sequence[str]) -> None:
         """Let the objects `shown` stand in a row, to the right of each other as seen from the
         front, and hide the others."""
-        bodies = [figure.body for figure in self.figures.values()]
-        if not bodies:
+        paintables = [object_view.paintable for object_view in self.objects.values()]
+        if not paintables:
             return
-        gap = _GAP * max(float((b.high - b.low).max()) for b in bodies) * self.factor
+        gap = _GAP * max(float((b.high - b.low).max()) for b in paintables) * self.factor
         right = 0.0
-        for key, figure in self.figures.items():
-            figure.frame.visible = key in shown
+        for key, object_view in self.objects.items():
+            object_view.frame.visible = key in shown
             if key not in shown:
                 continue
-            body = figure.body
-            low, high = body.low * self.factor, body.high * self.factor
+            paintable = object_view.paintable
+            low, high = paintable.low * self.factor, paintable.high * self.factor
             # +Z is the object's right-hand side: to the left of who stands before it.
-            figure.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
+            object_view.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
 
     def camera(
@@ -226,9 +231,9 @@ class Stage:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Where a camera with that width over height stands to see the objects `shown` from the
         front, or with places (k, 3) beside them from their right, and what it looks at."""
-        figures = [figure for key, figure in self.figures.items() if key in shown]
+        object_views = [object_view for key, object_view in self.objects.items() if key in shown]
         more = np.zeros((0, 3)) if beside is None else beside
-        corners = np.concatenate([more, *(figure.corners for figure in figures)])
+        corners = np.concatenate([more, *(object_view.corners for object_view in object_views)])
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
@@ -240,14 +245,15 @@ class Stage:
         away = float((np.abs(seen[:, :2]) / half + seen[:, 2:]).max())
         return middle + _ROOM * away * toward, middle
 
-    def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[Figure, int] | None:
+    def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[ObjectView, int] | None:
         """The object and its shown point that a ray meets first."""
         met = [
-            (found[1], figure, found[0])
-            for figure in self.figures.values()
-            if figure.frame.visible and (found := figure.hit(origin, direction)) is not None
+            (found[1], object_view, found[0])
+            for object_view in self.objects.values()
+            if object_view.frame.visible
+            and (found := object_view.hit(origin, direction)) is not None
         ]
         if not met:
             return None
-        _, figure, index = min(met, key=lambda entry: entry[0])
-        return figure, index
+        _, object_view, index = min(met, key=lambda entry: entry[0])
+        return object_view, index

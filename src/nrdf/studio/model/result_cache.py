@@ -11,39 +11,39 @@ from nrdf.errors import NrdfError, ProcessError
 from nrdf.io.cloud import PointCloud
 from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.transfer import TransferResult
-from nrdf.studio.computing import (
-    Computing,
-    Described,
+from nrdf.studio.model.computing import (
+    ChildProcessComputing,
+    CorrespondenceFeatures,
+    LocalComputing,
     Plan,
-    SeparateComputing,
     without_clouds,
 )
-from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
-from nrdf.studio.editor import Desk
-from nrdf.studio.worker import Progress
+from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.worker import Progress
 
 
 @dataclass(frozen=True)
-class Result:
+class TargetResult:
     """What arrived on a target, and of which lesson, by its number."""
 
-    transferred: TransferResult
+    transfer_result: TransferResult
     lesson: int
     target: Target
 
     @property
-    def doubtful(self) -> list[str]:
+    def uncertain_regions(self) -> list[str]:
         """Regions that a person should look at: skipped, or found with little confidence."""
-        regions = self.transferred.regions.values()
+        regions = self.transfer_result.regions.values()
         return [r.name for r in regions if r.missing or r.match.score < LOW_CONFIDENCE]
 
 
-class Bench:
-    """Plans and transfers of a desk's document, each kept as long as it holds."""
+class ResultCache:
+    """Plans and transfers of a editor's document, each kept as long as it holds."""
 
-    def __init__(self, desk: Desk, computing: Computing | SeparateComputing) -> None:
-        self.desk = desk
-        self.results: dict[str, Result] = {}
+    def __init__(self, editor: Editor, computing: LocalComputing | ChildProcessComputing) -> None:
+        self.editor = editor
+        self.by_target: dict[str, TargetResult] = {}
         self._computing = computing
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
         self._lesson: tuple[Document, int] | None = None
@@ -64,13 +64,13 @@ class Bench:
 
     # --- plans on the reference
 
-    def plan(self, region: Painted, number: int) -> Plan | None:
+    def plan(self, region: PaintedRegion, number: int) -> Plan | None:
         """A step's plan, None where it has not been made yet for what is painted and filled in."""
         kept = self._plans.get((region.name, number))
-        basis = _basis(self.desk.document, region, number)
+        basis = _basis(self.editor.document, region, number)
         return kept[1] if kept is not None and kept[0] == basis else None
 
-    def planned(self, region: Painted) -> list[np.ndarray]:
+    def planned(self, region: PaintedRegion) -> list[np.ndarray]:
         """The lines (m, 3) of a region's steps that are planned."""
         plans = [self.plan(region, number) for number in range(len(region.steps))]
         return [line for plan in plans if plan is not None for line in plan.lines]
@@ -84,7 +84,7 @@ class Bench:
         ]  # fmt: skip
         for done, (region, number) in enumerate(waiting):
             progress(done, len(waiting))
-            if self.desk.document.reference is not document.reference:
+            if self.editor.document.reference is not document.reference:
                 return
             basis = _basis(document, region, number)
             self._computing.share(_objects(document))
@@ -99,18 +99,18 @@ class Bench:
 
     def is_current(self, key: str) -> bool:
         """Whether a target's result is that of what is painted and filled in now."""
-        result = self.results.get(key)
+        result = self.by_target.get(key)
         return (
             result is not None
-            and result.target is self.desk.target(key)
+            and result.target is self.editor.target(key)
             and self._lesson is not None
             and result.lesson == self._lesson[1]
-            and _same_lesson(self._lesson[0], self.desk.document)
+            and _same_lesson(self._lesson[0], self.editor.document)
         )
 
-    def ready(self, key: str) -> Result:
+    def ready(self, key: str) -> TargetResult:
         """A target's result. Raises ProcessError where there is none of what is painted now."""
-        result = self.results.get(key)
+        result = self.by_target.get(key)
         if result is None:
             raise ProcessError("nothing has been brought to a target yet: do so in step 4")
         if not self.is_current(key):
@@ -132,7 +132,7 @@ class Bench:
             self._transfer(target, lesson, _within(progress, done, len(targets)))
 
     def _has(self, target: Target, lesson: int) -> bool:
-        result = self.results.get(target.object.name)
+        result = self.by_target.get(target.object.name)
         return result is not None and result.lesson == lesson and result.target is target
 
     def _taught(self, document: Document, progress: Progress) -> int:
@@ -143,7 +143,7 @@ class Bench:
             self._lessons += 1
             number = self._lessons
         self._computing.share(_objects(document))
-        clouds = self.desk.session.clouds
+        clouds = self.editor.session.clouds
         self._computing.ask("teach", number, clouds, without_clouds(document), progress=progress)
         self._lesson = document, number
         return number
@@ -151,36 +151,36 @@ class Bench:
     def _transfer(self, target: Target, lesson: int, progress: Progress) -> None:
         name = target.object.name
         try:
-            transferred = self._computing.ask(
+            transfer_result = self._computing.ask(
                 "transfer", target.object.file, dict(target.corrected), progress=progress
             )
         except NrdfError as error:
             raise type(error)(f"target {name}: {error}") from None
-        self.results[name] = Result(transferred, lesson, target)
+        self.by_target[name] = TargetResult(transfer_result, lesson, target)
 
     # --- likeness
 
-    def described(self, document: Document, progress: Progress) -> Described:
+    def described(self, document: Document, progress: Progress) -> CorrespondenceFeatures:
         """What the descriptors of the reference and of every target with a result say, computed
         where it has changed."""
         self._taught(document, progress)
         assert document.reference is not None  # else nothing is taught
         files = {REFERENCE: document.reference.file}
-        files |= {key: r.target.object.file for key, r in self.results.items()}
-        results = [result.target.object for result in self.results.values()]
+        files |= {key: r.target.object.file for key, r in self.by_target.items()}
+        results = [result.target.object for result in self.by_target.values()]
         self._computing.share([*_objects(document), *results])
-        described: Described = self._computing.ask(
+        described: CorrespondenceFeatures = self._computing.ask(
             "describe", document.reference.file, files, progress=progress
         )
         return described
 
 
-def _objects(document: Document) -> list[Loaded]:
+def _objects(document: Document) -> list[LoadedObject]:
     first = [] if document.reference is None else [document.reference]
     return [*first, *(target.object for target in document.targets)]
 
 
-def _basis(document: Document, region: Painted, number: int) -> bytes:
+def _basis(document: Document, region: PaintedRegion, number: int) -> bytes:
     """What a plan depends on."""
     reference = "" if document.reference is None else document.reference.file
     said = json.dumps([reference, region.name, dict(region.steps[number])], sort_keys=True)

@@ -20,60 +20,66 @@ from nrdf.io.result_folder import MANIFEST
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
 from nrdf.reports.job_folder import job_of, panel_of, write_job_files
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.editor import Desk
-from nrdf.studio.result_cache import Bench, Result
-from nrdf.studio.teaching import knowledge_of
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache, TargetResult
+from nrdf.studio.model.teaching import knowledge_of
 from nrdf.viz.picture import Panel, draw_regions
 
 SAVED = "saved"
 
 
-def save_knowledge(desk: Desk) -> Path:
+def save_knowledge(editor: Editor) -> Path:
     """The knowledge file, explained, with the reference's cloud beside it; their folder.
 
     Raises ProcessError for knowledge that is not complete.
     """
-    knowledge, document = knowledge_of(desk.session.clouds, desk.document), desk.document
+    knowledge, document = knowledge_of(editor.session.clouds, editor.document), editor.document
     assert document.reference is not None  # else there is no knowledge
-    place = place_of(desk, "knowledge")
+    place = place_of(editor, "knowledge")
     with output_folder(place, overwrite=True) as folder:
         file = f"{knowledge.category}.yaml"
         write_knowledge(folder / file, knowledge, explained=True)
-        shutil.copyfile(desk.session.path_of(document.reference), folder / document.reference.file)
+        shutil.copyfile(
+            editor.session.path_of(document.reference), folder / document.reference.file
+        )
     return place
 
 
-def save_job(desk: Desk, name: str, result: Result, origin: Mapping[str, Any]) -> Path:
+def save_job(editor: Editor, name: str, result: TargetResult, origin: Mapping[str, Any]) -> Path:
     """A target's job, as `nrdf transfer` writes it; its folder."""
-    place = place_of(desk, name, "job")
+    place = place_of(editor, name, "job")
     with output_folder(place, overwrite=True) as folder:
-        write_job_files(folder, result.transferred, Limits(), name, origin)
+        write_job_files(folder, result.transfer_result, Limits(), name, origin)
     return place
 
 
-def save_programs(desk: Desk, name: str, result: Result, formats: Sequence[str]) -> Path:
+def save_programs(editor: Editor, name: str, result: TargetResult, formats: Sequence[str]) -> Path:
     """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
-    place = place_of(desk, name, "programs")
+    place = place_of(editor, name, "programs")
     with output_folder(place, overwrite=True) as folder:
-        export_job(job_of(result.transferred), formats, folder)
+        export_job(job_of(result.transfer_result), formats, folder)
     return place
 
 
-def save_picture(desk: Desk, bench: Bench) -> Path:
+def save_picture(editor: Editor, results: ResultCache) -> Path:
     """The reference and the targets side by side; the picture's file."""
-    document = desk.document
+    document = editor.document
     if document.reference is None:
         raise ProcessError("there is nothing to draw: load a reference in step 1")
-    lines = {region.name: bench.planned(region) for region in document.regions}
-    body = desk.body(REFERENCE)
+    lines = {region.name: results.planned(region) for region in document.regions}
+    paintable = editor.paintable(REFERENCE)
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions}
-    panels = [Panel(document.reference.name, body.points, body.normals, regions, "taught", lines)]
+    panels = [
+        Panel(
+            document.reference.name, paintable.points, paintable.normals, regions, "taught", lines
+        )
+    ]
     for target in document.targets:
-        result = bench.results.get(target.object.name)
+        result = results.by_target.get(target.object.name)
         if result is not None:
-            panels.append(panel_of(result.transferred, target.object.name))
-    place = place_of(desk, "picture.png")
+            panels.append(panel_of(result.transfer_result, target.object.name))
+    place = place_of(editor, "picture.png")
     with output_file(place):
         draw_regions(panels, place)
     return place
@@ -89,7 +95,7 @@ def zipped(folder: Path) -> bytes:
     return buffer.getvalue()
 
 
-def place_of(desk: Desk, *parts: str) -> Path:
+def place_of(editor: Editor, *parts: str) -> Path:
     """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
     # A session's file may have been written by somebody else, with any names.
-    return desk.session.folder.joinpath(SAVED, *(safe_file_name(p, "target") for p in parts))
+    return editor.session.folder.joinpath(SAVED, *(safe_file_name(p, "target") for p in parts))

@@ -29,7 +29,7 @@ from nrdf.io.files import read_file
 from nrdf.io.schema import StrictModel, validation_messages
 from nrdf.process.new_knowledge import KINDS
 from nrdf.regions.region import region_name_fault
-from nrdf.studio.document import REFERENCE, Document, Loaded, Painted, Target
+from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
 
 FILE = "session.json"
 CLOUDS = "clouds"
@@ -165,7 +165,7 @@ def read_document(folder: Path) -> Document:
     try:
         reference = _read_object(folder, content.reference)
         regions = tuple(
-            Painted(r.name, r.colour, _mask(r.indices, reference, r.name), _steps(r))
+            PaintedRegion(r.name, r.colour, _mask(r.indices, reference, r.name), _steps(r))
             for r in content.regions
         )
         targets = tuple(_read_target(folder, target) for target in content.targets)
@@ -218,10 +218,10 @@ def _steps(region: _Region) -> tuple[dict[str, Any], ...]:
     return tuple(step.model_dump(exclude_unset=True) for step in region.steps)
 
 
-def _read_object(folder: Path, content: _Object) -> Loaded:
+def _read_object(folder: Path, content: _Object) -> LoadedObject:
     cloud = read_cloud(folder / CLOUDS / content.file)
     check_cloud(cloud, MINIMUM_POINTS)
-    return Loaded(content.name, cloud, content.file)
+    return LoadedObject(content.name, cloud, content.file)
 
 
 def _read_target(folder: Path, content: _Target) -> Target:
@@ -230,7 +230,7 @@ def _read_target(folder: Path, content: _Target) -> Target:
     return Target(loaded, corrected)
 
 
-def _mask(indices: list[int], loaded: Loaded, name: str) -> np.ndarray:
+def _mask(indices: list[int], loaded: LoadedObject, name: str) -> np.ndarray:
     mask = np.zeros(len(loaded.cloud), bool)
     if indices and not 0 <= min(indices) <= max(indices) < len(mask):
         raise ProcessError(f"region '{name}' has points that {loaded.name} does not have")
@@ -241,7 +241,7 @@ def _mask(indices: list[int], loaded: Loaded, name: str) -> np.ndarray:
 def _plain(document: Document) -> dict[str, Any]:
     """A document as its file holds it; regions as indices."""
 
-    def loaded(of: Loaded) -> dict[str, str]:
+    def loaded(of: LoadedObject) -> dict[str, str]:
         return {"name": of.name, "file": of.file}
 
     return {

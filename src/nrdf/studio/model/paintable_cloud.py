@@ -12,12 +12,12 @@ from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
-from nrdf.studio.painting import Canvas
+from nrdf.studio.model.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
 from nrdf.surface.surface import Surface
 
 
-class Body:
+class PaintableCloud:
     """An object to be shown and painted on.
 
     cloud: (n,) points, m. points, normals: (k, 3) of those that are shown, `shown` (k,) their

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from nrdf.errors import NrdfError
-from nrdf.studio.worker import Cancelled, Progress
+from nrdf.studio.model.worker import Cancelled, Progress
 
 log = logging.getLogger(__name__)
 
@@ -25,7 +25,7 @@ def _nothing(said: Any, *more: Any) -> None:
     """Progress, or a phase, that nobody looks at."""
 
 
-class Separate:
+class ChildProcess:
     """A process that runs `serve(pipe, *args)` and answers through the pipe, a pair a time:
     ("progress", (done, all)), ("phase", words), and at last ("made", value), ("cancelled", None),
     ("refused", NrdfError) or ("failed", traceback).

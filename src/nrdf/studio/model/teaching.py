@@ -14,7 +14,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge, checksum, overlaps, res
 from nrdf.process.knowledge import Knowledge, Process, Trajectory
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
-from nrdf.studio.document import Document, Painted
+from nrdf.studio.model.document import Document, PaintedRegion
 
 PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")
 NUMBERS = (
@@ -65,7 +65,7 @@ def changed_step(step: Mapping[str, Any], shown: Mapping[str, float]) -> dict[st
     return content
 
 
-def process_of(region: Painted, number: int) -> Process:
+def process_of(region: PaintedRegion, number: int) -> Process:
     """One step of a region. Raises ProcessError naming region, field and value."""
     content = _content("chair", {"points_m": [(0.0, 0.0, 0.0)]}, (region,))
     return validated(content, ORIGIN).regions[0].processes[number]
@@ -89,7 +89,7 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
     )
 
 
-def lesson_of(clouds: Path, document: Document) -> BoundKnowledge:
+def bound_knowledge_of(clouds: Path, document: Document) -> BoundKnowledge:
     """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
     as `knowledge_of` and `nrdf.process.bound_knowledge.resolve` do."""
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
@@ -102,7 +102,7 @@ def lesson_of(clouds: Path, document: Document) -> BoundKnowledge:
 
 
 def _content(
-    category: str, reference: Mapping[str, Any], regions: tuple[Painted, ...]
+    category: str, reference: Mapping[str, Any], regions: tuple[PaintedRegion, ...]
 ) -> dict[str, Any]:
     return {
         "category": category,
@@ -118,16 +118,16 @@ def _content(
     }
 
 
-def painted_of(
+def painted_regions_of(
     lesson: BoundKnowledge, colours: Mapping[str, tuple[int, int, int]]
-) -> tuple[Painted, ...]:
+) -> tuple[PaintedRegion, ...]:
     """A lesson's regions and steps, to be changed on the page."""
     painted = []
     for region in lesson.knowledge.regions:
         mask = np.zeros(len(lesson.cloud), bool)
         mask[lesson.regions[region.name]] = True
         steps = tuple(plain_step(process) for process in region.processes)
-        painted.append(Painted(region.name, colours[region.name], mask, steps))
+        painted.append(PaintedRegion(region.name, colours[region.name], mask, steps))
     return tuple(painted)
 
 

@@ -7,8 +7,8 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.similarity import about_up
-from nrdf.studio.playback import EVERY_PATH, FLOOR, Playback
-from nrdf.studio.scene_view import Figure
+from nrdf.studio.model.playback import EVERY_PATH, FLOOR, Playback
+from nrdf.studio.scene.scene_view import ObjectView
 
 _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the cell's frame, z up, to the stage's directions, y up, the object's x staying x."""
@@ -18,13 +18,13 @@ _ROOM_M = (-0.08, 0.08)  # around the arm's frames, for its thickness
 _EVERY = 25  # moments between those that a camera is placed by
 
 
-class Rig:
+class ArmView:
     """The arm, its tool and what they stand on; the object turns with its turntable."""
 
-    def __init__(self, figure: Figure, playback: Playback) -> None:
-        self.figure, self.playback = figure, playback
-        self._factor = figure.stage.factor
-        self._scene = figure.stage.server.scene
+    def __init__(self, object_view: ObjectView, playback: Playback) -> None:
+        self.object_view, self.playback = object_view, playback
+        self._factor = object_view.scene_view.factor
+        self._scene = object_view.scene_view.server.scene
         wxyz = np.roll(Rotation.from_matrix(_CELL).as_quat(), 1)
         self._root = self._scene.add_frame("/arm", show_axes=False, wxyz=wxyz)
         self._bodies: dict[int, viser.FrameHandle] = {}
@@ -41,17 +41,17 @@ class Rig:
             )
             if shape.path != EVERY_PATH:
                 self._tools.setdefault(shape.path, []).append(mesh)
-        body = figure.body
+        paintable = object_view.paintable
         self._marks = self._scene.add_point_cloud(
-            f"{figure.path}/missed",
+            f"{object_view.path}/missed",
             (playback.missed * self._factor).astype(np.float32),
             np.full((len(playback.missed), 3), _MISSED, np.uint8),
-            point_size=_MISSED_SIZE * body.surface.spacing * self._factor,
+            point_size=_MISSED_SIZE * paintable.surface.spacing * self._factor,
             point_shape="circle",
             precision="float32",
         )
         self._at = -1
-        self.stand(figure.offset)
+        self.stand(object_view.offset)
 
     @property
     def places(self) -> np.ndarray:
@@ -77,7 +77,7 @@ class Rig:
         angle = float(playback.turn_rad[at])
         # The turntable's axis goes through the cell's origin.
         turn = about_up(angle)
-        self.figure.stand(self._origin + turn @ self._object, turn @ self._upright)
+        self.object_view.stand(self._origin + turn @ self._object, turn @ self._upright)
         for body, frame in self._bodies.items():
             frame.position = tuple(playback.positions[at, body] * self._factor)
             frame.wxyz = tuple(playback.quaternions_wxyz[at, body])
@@ -92,7 +92,7 @@ class Rig:
 
     def remove(self) -> None:
         """Take the arm away, and let the object stand as it does without one."""
-        self.figure.stand(self._origin + self._object)
+        self.object_view.stand(self._origin + self._object)
         self._root.remove()
         self._marks.remove()
 

@@ -19,7 +19,7 @@ REFERENCE = "reference"
 
 
 @dataclass(frozen=True)
-class Painted:
+class PaintedRegion:
     """A region of the reference: mask (n,) bool; colour: red, green, blue, 0 to 255; steps: what is
     done to it, each as the mapping that a knowledge file holds, SI (it need not be right yet)."""
 
@@ -30,7 +30,7 @@ class Painted:
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedObject:
     """An object: what people call it, its cloud in metres, and its file in the session's folder."""
 
     name: str
@@ -43,7 +43,7 @@ class Target:
     """An object that the process is brought to. corrected: regions painted by hand on it, name to
     mask (m,) bool, in place of those that are found."""
 
-    object: Loaded
+    object: LoadedObject
     corrected: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
@@ -52,12 +52,12 @@ class Document:
     """Everything of a session that a person has made."""
 
     category: str = "chair"
-    reference: Loaded | None = None
-    regions: tuple[Painted, ...] = ()
+    reference: LoadedObject | None = None
+    regions: tuple[PaintedRegion, ...] = ()
     targets: tuple[Target, ...] = ()
     allow_overlap: bool = False
 
-    def region(self, name: str) -> Painted | None:
+    def region(self, name: str) -> PaintedRegion | None:
         """The region of that name, or None."""
         return next((r for r in self.regions if r.name == name), None)
 

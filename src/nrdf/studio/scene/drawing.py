@@ -7,44 +7,46 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.reports.job_folder import panel_of
-from nrdf.studio.colours import confidence_colours, painted_colours
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.editor import Desk
-from nrdf.studio.result_cache import Bench
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.scene.colours import confidence_colours, painted_colours
 
 _DEEP, _PALE = 0.5, 0.62
 """Shares of a region's colour in the lines on it, and in the region where there are lines."""
 
 
-def found(bench: Bench, key: str, region: str) -> np.ndarray | None:
+def found(results: ResultCache, key: str, region: str) -> np.ndarray | None:
     """Indices (k,) of a target's points that were found to be in a region, None where none were."""
-    result = bench.results.get(key)
-    if result is None or region not in result.transferred.regions:
+    result = results.by_target.get(key)
+    if result is None or region not in result.transfer_result.regions:
         return None
-    region_there = result.transferred.regions[region]
+    region_there = result.transfer_result.regions[region]
     return None if region_there.missing else region_there.match.indices
 
 
-def colours_of(desk: Desk, bench: Bench, key: str, by_confidence: bool = False) -> np.ndarray:
+def colours_of(
+    editor: Editor, results: ResultCache, key: str, by_confidence: bool = False
+) -> np.ndarray:
     """Colours (k, 3) uint8 of an object's shown points by their regions; a target's also by their
     confidence, which is all there is to see `by_confidence`."""
-    body, target = desk.body(key), desk.target(key)
+    paintable, target = editor.paintable(key), editor.target(key)
     drawn: list[tuple[tuple[int, int, int], np.ndarray, np.ndarray | None]] = []
-    for region in desk.document.regions:
-        there = found(bench, key, region.name)
+    for region in editor.document.regions:
+        there = found(results, key, region.name)
         corrected = target is not None and region.name in target.corrected
         confidence = None
         if target is not None and not corrected:
             if there is None:
                 continue
-            match = bench.results[key].transferred.regions[region.name].match
-            everywhere = np.zeros(len(body.cloud))
+            match = results.by_target[key].transfer_result.regions[region.name].match
+            everywhere = np.zeros(len(paintable.cloud))
             everywhere[there] = match.confidence
-            confidence = body.to_shown(everywhere)
-        indices = np.flatnonzero(desk.mask(key, region.name, there))
+            confidence = paintable.to_shown(everywhere)
+        indices = np.flatnonzero(editor.mask(key, region.name, there))
         own = None if confidence is None else confidence[indices]
         drawn.append((region.colour, indices, own))
-    count = len(body.points)
+    count = len(paintable.points)
     if by_confidence and target is not None:
         sure = [(i, np.ones(len(i)) if c is None else c) for _, i, c in drawn]
         return confidence_colours(count, sure)
@@ -52,46 +54,46 @@ def colours_of(desk: Desk, bench: Bench, key: str, by_confidence: bool = False) 
 
 
 def lines_of(
-    desk: Desk, bench: Bench, key: str
+    editor: Editor, results: ResultCache, key: str
 ) -> dict[str, tuple[Sequence[np.ndarray], np.ndarray]]:
     """The lines on an object's regions: name to places, each (m, 3), m, and a colour (3,)."""
-    colours = {r.name: _DEEP * np.array(r.colour) for r in desk.document.regions}
+    colours = {r.name: _DEEP * np.array(r.colour) for r in editor.document.regions}
     if key != REFERENCE:
-        result = bench.results.get(key)
-        drawn = {} if result is None else panel_of(result.transferred, key).lines
+        result = results.by_target.get(key)
+        drawn = {} if result is None else panel_of(result.transfer_result, key).lines
         return {name: (parts, colours[name]) for name, parts in drawn.items() if name in colours}
     lines: dict[str, tuple[Sequence[np.ndarray], np.ndarray]] = {}
-    for region in desk.document.regions:
-        parts = bench.planned(region)
+    for region in editor.document.regions:
+        parts = results.planned(region)
         if parts:
             lines[region.name] = (parts, colours[region.name])
     return lines
 
 
-def title_of(desk: Desk, bench: Bench, key: str) -> str:
+def title_of(editor: Editor, results: ResultCache, key: str) -> str:
     """What stands above an object: its name, and what a person should look at."""
     if key == REFERENCE:
-        reference = desk.document.reference
+        reference = editor.document.reference
         return "" if reference is None else f"{reference.name}, taught here"
-    result = bench.results.get(key)
-    if result is None or not result.doubtful:
+    result = results.by_target.get(key)
+    if result is None or not result.uncertain_regions:
         return key
-    return f"{key}: look at {', '.join(result.doubtful)}"
+    return f"{key}: look at {', '.join(result.uncertain_regions)}"
 
 
-def direction_of(desk: Desk, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:
+def direction_of(editor: Editor, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Ends, each (3,), m, of the arrow along a step's lines on the reference, None for no arrow."""
-    painted = desk.document.region(region)
+    painted = editor.document.region(region)
     if painted is None or not painted.mask.any():
         return None
     direction = painted.steps[step].get("direction")
     if direction is None or not np.linalg.norm(direction) > 0:
         return None
-    body = desk.body(REFERENCE)
-    points = body.points[painted.mask]
+    paintable = editor.paintable(REFERENCE)
+    points = paintable.points[painted.mask]
     middle = points[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
     along = np.asarray(direction, np.float64) / np.linalg.norm(direction)
-    half = 0.1 * float((body.high - body.low).max()) * along
+    half = 0.1 * float((paintable.high - paintable.low).max()) * along
     return middle - half, middle + half
 
 

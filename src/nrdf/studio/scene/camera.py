@@ -12,7 +12,7 @@ _HIDDEN = 2.5
 
 
 @dataclass(frozen=True)
-class View:
+class Camera:
     """A pinhole camera.
 
     position: (3,); rotation: (3, 3) from the camera's axes (x right, y down, z forward) to the
@@ -28,11 +28,11 @@ class View:
     @staticmethod
     def of(
         position: np.ndarray, quaternion_wxyz: np.ndarray, fov_rad: float, aspect: float
-    ) -> View:
+    ) -> Camera:
         """The view of a camera whose rotation is a quaternion, scalar first."""
         w, x, y, z = quaternion_wxyz
         rotation = Rotation.from_quat([x, y, z, w]).as_matrix()
-        return View(np.asarray(position, np.float64), rotation, fov_rad, aspect)
+        return Camera(np.asarray(position, np.float64), rotation, fov_rad, aspect)
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, 2) of points (n, 3) on the screen, and their depths (n,); depths of 0 or less
@@ -76,7 +76,7 @@ def hit(
 
 
 def inside(
-    view: View,
+    view: Camera,
     points: np.ndarray,
     normals: np.ndarray,
     corners: tuple[tuple[float, float], tuple[float, float]],
@@ -93,7 +93,7 @@ def inside(
     return chosen if through else chosen & visible(view, points, normals, spacing)
 
 
-def visible(view: View, points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
+def visible(view: Camera, points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
     """Which points (n,) of a surface face the camera with no other one before them.
 
     A depth image whose cells are as wide as `spacing` at the nearest point's depth.

@@ -8,8 +8,8 @@ import pytest
 from builders.taught_box import cloud
 from nrdf.errors import CloudError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.studio import uploads
-from nrdf.studio.uploads import read_upload, shown_name, to_paint_on
+from nrdf.studio.model import uploads
+from nrdf.studio.model.uploads import read_upload, shown_name, thinned_reference
 
 
 @pytest.fixture
@@ -67,4 +67,4 @@ def test_names_are_short_and_printable():
 
 def test_a_dense_reference_is_thinned_as_the_model_does():
     dense = PointCloud(np.random.default_rng(0).normal(size=(20_000, 3)), unit="m")
-    assert len(to_paint_on(dense)) == 16_384
+    assert len(thinned_reference(dense)) == 16_384

@@ -19,11 +19,11 @@ from nrdf.errors import ProcessError, RobotError
 from nrdf.robot.model.cell import Placement
 from nrdf.robot.simulation.job import read_simulation_job
 from nrdf.robot.simulation.simulate import simulate
-from nrdf.studio import simulator
-from nrdf.studio.playback import EVERY_PATH, FLOOR, playback_of
-from nrdf.studio.player import Player
-from nrdf.studio.simulator import Simulator, need_engine
-from nrdf.studio.worker import Cancelled
+from nrdf.studio.model import simulation_process
+from nrdf.studio.model.playback import EVERY_PATH, FLOOR, playback_of
+from nrdf.studio.model.simulation_process import SimulationProcess, require_mujoco
+from nrdf.studio.model.worker import Cancelled
+from nrdf.studio.scene.player import Player
 
 TOP_M = 0.42  # height of the plate that the job is on
 
@@ -71,27 +71,27 @@ def test_what_a_playback_holds(playback):
 def stage(plate_job):
     """A stage with the plate that the job is on; without a browser."""
     pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-    from nrdf.studio.scene_view import Stage
+    from nrdf.studio.scene.scene_view import SceneView
     from nrdf.studio.serving import open_server
 
     server = open_server("127.0.0.1", 8465)
-    made = Stage(server)
+    made = SceneView(server)
     made.clear(2.5)
     yield made
     server.stop()
 
 
 def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, plate_job):
-    from nrdf.studio.arm_view import Rig
-    from nrdf.studio.paintable_cloud import Body
+    from nrdf.studio.model.paintable_cloud import PaintableCloud
+    from nrdf.studio.scene.arm_view import ArmView
 
-    plate = Body(read_simulation_job(plate_job).bound_knowledge.cloud)
-    figure = stage.add("plate", plate)
+    plate = PaintableCloud(read_simulation_job(plate_job).bound_knowledge.cloud)
+    object_view = stage.add("plate", plate)
     stage.arrange(["plate"])
-    stood = figure.offset
-    rig = Rig(figure, playback)
+    stood = object_view.offset
+    arm_view = ArmView(object_view, playback)
     pad = next(s for s in playback.shapes if s.path == 0 and s.colour[0] > 2 * s.colour[2])
-    frames = {handle.name: handle for handle in (rig._root, *rig._bodies.values())}
+    frames = {handle.name: handle for handle in (arm_view._root, *arm_view._bodies.values())}
 
     def placed(name, points):
         frame = frames[name]
@@ -99,20 +99,20 @@ def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, plate_job):
         return turn.apply(points) + frame.position
 
     for at in np.flatnonzero(playback.doing == "process")[20::40]:
-        rig.show(int(at))
+        arm_view.show(int(at))
         scene = placed("/arm", placed(f"/arm/body{pad.body}", pad.vertices * stage.factor))
         down = np.array([0.0, -1.0, 0.0])
         met = stage.hit(scene.mean(axis=0) - down, down)
         assert met is not None, "the object is below the pad, turned as the turntable is"
-        turned = Rotation.from_quat(np.roll(figure.frame.wxyz, -1))
+        turned = Rotation.from_quat(np.roll(object_view.frame.wxyz, -1))
         assert turned.magnitude() == pytest.approx(playback.turn_rad[at])
-        point = turned.apply(plate.points[met[1]] * stage.factor) + figure.frame.position
+        point = turned.apply(plate.points[met[1]] * stage.factor) + object_view.frame.position
         assert scene[:, 1].min() == pytest.approx(point[1], abs=0.006 * stage.factor)
-    seen = rig.places
+    seen = arm_view.places
     assert len(seen) and seen[:, 1].min() < 0.0, "the column's foot is below the raised object"
-    rig.remove()
-    np.testing.assert_allclose(figure.offset, stood, atol=1e-12)
-    assert figure.frame.wxyz[0] == pytest.approx(1.0)
+    arm_view.remove()
+    np.testing.assert_allclose(object_view.offset, stood, atol=1e-12)
+    assert object_view.frame.wxyz[0] == pytest.approx(1.0)
 
 
 def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
@@ -122,7 +122,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
 ):
     monkeypatch.setenv("MUJOCO_GL", "off")  # pictures take long, and have tests of their own
     seen, said = [], []
-    running = Simulator(plate_job)
+    running = SimulationProcess(plate_job)
     made = running.drive(lambda done, total: seen.append(done / total), said.append)
     assert made.report["total"]["waypoints"] == 27 and made.seconds > 5
     assert sorted(set(seen)) == sorted(set(seen), key=seen.index) and 0 < seen[-1] < 1
@@ -131,7 +131,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
     assert json.loads((tmp_path / "sim" / "report.json").read_text())["title"] == "plate"
     assert {"joints.csv", "report.html"} <= set(report["files"])
     assert [path.name for path in tmp_path.iterdir()] == ["sim"]
-    running._separate._process.kill()
+    running._child._process.kill()
     with pytest.raises(RobotError, match="ended by itself"):
         running.write(tmp_path / "sim", "plate", {}, silent)
     running.end()
@@ -139,11 +139,11 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
 
 def test_what_the_command_line_refuses_is_refused_alike(tmp_path):
     with pytest.raises(ProcessError, match="empty"):
-        Simulator(tmp_path / "empty").drive(silent)
+        SimulationProcess(tmp_path / "empty").drive(silent)
 
 
 def test_cancelling_ends_the_process(plate_job):
-    running = Simulator(plate_job)
+    running = SimulationProcess(plate_job)
 
     def cancelled(done, total):
         raise Cancelled
@@ -162,13 +162,13 @@ def test_cancelling_ends_the_process(plate_job):
     assert waits.wait(10)
     running.end()
     waiting.join(10)
-    assert not running._separate._process.is_alive() and told == ["cancelled"]
+    assert not running._child._process.is_alive() and told == ["cancelled"]
 
 
 def test_without_mujoco_it_says_what_to_install(monkeypatch):
-    monkeypatch.setattr(simulator, "find_spec", lambda name: None)
+    monkeypatch.setattr(simulation_process, "find_spec", lambda name: None)
     with pytest.raises(RobotError, match=r"pip install 'nrdf\[robot\]'"):
-        need_engine()
+        require_mujoco()
 
 
 def test_a_player_plays_pauses_and_ends_by_itself():

@@ -20,12 +20,12 @@ from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.check import CheckedProcess, check_process
 from nrdf.process.transfer import ProcessTransfer, TransferResult, touched
-from nrdf.studio.document import Document, Loaded, Painted
-from nrdf.studio.paintable_cloud import Body
-from nrdf.studio.separate import Separate, answer, progress_of
-from nrdf.studio.teaching import lesson_of, process_of
-from nrdf.studio.uploads import read_upload
-from nrdf.studio.worker import Progress
+from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
+from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
+from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.model.teaching import bound_knowledge_of, process_of
+from nrdf.studio.model.uploads import read_upload
+from nrdf.studio.model.worker import Progress
 
 if TYPE_CHECKING:
     from nrdf.field.encoded_cloud import EncodedCloud
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _NOT_SENT = PointCloud(np.zeros((0, 3)))
 
 
-class ComputingEnded(NrdfError):
+class ComputingProcessEnded(NrdfError):
     """The process that computes has ended by itself."""
 
 
@@ -60,7 +60,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Described:
+class CorrespondenceFeatures:
     """What the descriptors of several objects say, by
     `nrdf.regions.reference.EncodedReference.described`.
 
@@ -72,13 +72,13 @@ class Described:
     reference: np.ndarray
     nearest: np.ndarray
 
-    def unlike(self, index: int) -> dict[str, np.ndarray]:
+    def distances(self, index: int) -> dict[str, np.ndarray]:
         """How far each object's shown points (k,) are from a shown point of the reference."""
         here = self.reference[self.nearest[index]]
         return {key: np.linalg.norm(said - here, axis=1) for key, said in self.objects.items()}
 
 
-class Computing:
+class LocalComputing:
     """Computes for one document after the other, and keeps what the next can use.
 
     load: gives the model of a category. Every order is a method, by name and arguments; `share`
@@ -89,7 +89,7 @@ class Computing:
         self._load = load
         self._models: dict[str, Model] = {}
         self._clouds: dict[str, PointCloud] = {}
-        self._bodies: dict[str, Body] = {}
+        self._paintables: dict[str, PaintableCloud] = {}
         self._embedded: dict[tuple[str, str], EncodedCloud] = {}
         self._said: dict[tuple[str, str, str], np.ndarray] = {}
         self._teacher: tuple[int, ProcessTransfer] | None = None
@@ -98,14 +98,16 @@ class Computing:
         """One of the methods below, by its name."""
         return getattr(self, name)(*args, progress=progress)
 
-    def share(self, objects: Iterable[Loaded]) -> None:
+    def share(self, objects: Iterable[LoadedObject]) -> None:
         """Know the clouds of these objects, by their files, and forget all others."""
         self.know({loaded.file: loaded.cloud for loaded in objects})
 
     def know(self, clouds: Mapping[str, PointCloud | None]) -> None:
         """Know these clouds, by their files; None stands for one that is known already."""
         self._clouds = {f: self._clouds[f] if c is None else c for f, c in clouds.items()}
-        self._bodies = {f: body for f, body in self._bodies.items() if f in clouds}
+        self._paintables = {
+            f: paintable for f, paintable in self._paintables.items() if f in clouds
+        }
         self._embedded = {k: kept for k, kept in self._embedded.items() if k[1] in clouds}
         self._said = {k: said for k, said in self._said.items() if {k[1], k[2]} <= set(clouds)}
 
@@ -115,20 +117,20 @@ class Computing:
     def read(
         self, name: str, content: bytes, category: str, unit: str | None, progress: Progress
     ) -> PointCloud:
-        """`nrdf.studio.uploads.read_upload`."""
+        """`nrdf.studio.model.uploads.read_upload`."""
         progress(0, 1)
         return read_upload(name, content, category, unit)
 
-    def plan(self, reference: str, region: Painted, number: int, progress: Progress) -> Plan:
+    def plan(self, reference: str, region: PaintedRegion, number: int, progress: Progress) -> Plan:
         """A step of a region, planned on the reference."""
         progress(0, 1)
         try:
             process = process_of(region, number)
         except ProcessError as error:
             return Plan(str(error))
-        body = self._body(reference)
+        paintable = self._paintable(reference)
         indices = np.flatnonzero(region.mask)
-        checked = check_process(body.surface, region.name, indices, process, body.given)
+        checked = check_process(paintable.surface, region.name, indices, process, paintable.given)
         return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
 
     def teach(self, lesson: int, clouds: Path, document: Document, progress: Progress) -> None:
@@ -140,7 +142,7 @@ class Computing:
         progress(0, 1)
         if self._teacher is None or self._teacher[0] != lesson:
             model = self._model(document.category)
-            self._teacher = lesson, ProcessTransfer(lesson_of(clouds, document), model)
+            self._teacher = lesson, ProcessTransfer(bound_knowledge_of(clouds, document), model)
 
     def transfer(
         self, target: str, marked: Mapping[str, np.ndarray], progress: Progress
@@ -150,7 +152,9 @@ class Computing:
         teacher = self._taught
         return teacher.transfer(self._seen(target), marked=dict(marked), progress=progress)
 
-    def describe(self, reference: str, files: Mapping[str, str], progress: Progress) -> Described:
+    def describe(
+        self, reference: str, files: Mapping[str, str], progress: Progress
+    ) -> CorrespondenceFeatures:
         """What the descriptors of objects, by key and file, say of what was taught last."""
         taught = self._taught.taught
         said = {}
@@ -162,7 +166,7 @@ class Computing:
                 self._said[place] = taught.described(seen)
             said[key] = self._said[place]
         own = oriented_features(taught.reference.points, taught.reference.normals, NORMAL_WEIGHT)
-        return Described(said, own, taught.reference.nearest_working)
+        return CorrespondenceFeatures(said, own, taught.reference.nearest_working)
 
     @property
     def _taught(self) -> ProcessTransfer:
@@ -174,10 +178,10 @@ class Computing:
             self._models[category] = self._load(category)
         return self._models[category]
 
-    def _body(self, file: str) -> Body:
-        if file not in self._bodies:
-            self._bodies[file] = Body(self._clouds[file])
-        return self._bodies[file]
+    def _paintable(self, file: str) -> PaintableCloud:
+        if file not in self._paintables:
+            self._paintables[file] = PaintableCloud(self._clouds[file])
+        return self._paintables[file]
 
     def _seen(self, file: str) -> EncodedCloud:
         model = self._taught.model
@@ -186,7 +190,7 @@ class Computing:
         return self._embedded[model.category, file]
 
 
-class SeparateComputing:
+class ChildProcessComputing:
     """The same, in a process of its own, which is started when it is needed, and again when it has
     ended; clouds go there once.
 
@@ -195,39 +199,40 @@ class SeparateComputing:
 
     def __init__(self, load: Callable[[str], Model]) -> None:
         self._load = load
-        self._separate: Separate | None = None
+        self._child: ChildProcess | None = None
         self._wanted: dict[str, PointCloud] = {}
         self._known: set[str] = set()
 
-    def share(self, objects: Iterable[Loaded]) -> None:
-        """As of `Computing`."""
+    def share(self, objects: Iterable[LoadedObject]) -> None:
+        """As of `LocalComputing`."""
         self._wanted = {loaded.file: loaded.cloud for loaded in objects}
 
     def ask(self, name: str, *args: Any, progress: Progress) -> Any:
-        """As of `Computing`. Raises ComputingEnded where the process ends before it answers."""
-        if self._separate is None or not self._separate.alive:
+        """As of `LocalComputing`. Raises ComputingProcessEnded if the process ends before it
+        answers."""
+        if self._child is None or not self._child.alive:
             self.end()
-            self._separate = Separate(_serve, (self._load,), _gone)
+            self._child = ChildProcess(_serve, (self._load,), _gone)
         sent = {f: None if f in self._known else c for f, c in self._wanted.items()}
         self._known = set(sent)
         try:
-            return self._separate.ask((sent, name, args), progress)
-        except ComputingEnded:
+            return self._child.ask((sent, name, args), progress)
+        except ComputingProcessEnded:
             self.end()
             raise
 
     def end(self) -> None:
         """End the process."""
         self._known = set()
-        if self._separate is not None:
-            self._separate.end()
-        self._separate = None
+        if self._child is not None:
+            self._child.end()
+        self._child = None
 
 
 def without_clouds(document: Document) -> Document:
     """The document as it is sent: objects are known by their files."""
 
-    def bare(loaded: Loaded) -> Loaded:
+    def bare(loaded: LoadedObject) -> LoadedObject:
         return replace(loaded, cloud=_NOT_SENT)
 
     reference = None if document.reference is None else bare(document.reference)
@@ -235,8 +240,8 @@ def without_clouds(document: Document) -> Document:
     return replace(document, reference=reference, targets=targets)
 
 
-def _gone(why: str) -> ComputingEnded:
-    return ComputingEnded(
+def _gone(why: str) -> ComputingProcessEnded:
+    return ComputingProcessEnded(
         f"the process that computes has ended by itself ({why}), by a fault of native code or for "
         "lack of memory. What you made is kept. It is started again with the next thing that you "
         "do; if it ends again, take away the object or region that it worked on"
@@ -245,7 +250,7 @@ def _gone(why: str) -> ComputingEnded:
 
 def _serve(pipe: Connection, load: Callable[[str], Model]) -> None:
     """In the process: what is asked for, until the other side is gone."""
-    computing = Computing(load)
+    computing = LocalComputing(load)
     while True:
         order = pipe.recv()
         if order is not None:  # else given up when it was answered already

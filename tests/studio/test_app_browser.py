@@ -24,11 +24,11 @@ import nrdf
 from nrdf.bundled import bundled_chair
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.studio.app import Studio
-from nrdf.studio.computing import SeparateComputing
-from nrdf.studio.document import REFERENCE
-from nrdf.studio.mouse import view_of
+from nrdf.studio.model.computing import ChildProcessComputing
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.session import Session
+from nrdf.studio.mouse import camera_of
 from nrdf.studio.serving import open_server
-from nrdf.studio.session import Session
 from nrdf.toolpath.file import read_toolpaths
 
 SHOTS = Path(__file__).parents[2] / "build" / "studio"
@@ -68,14 +68,14 @@ class Person:
 
     def __init__(self, page, studio: Studio) -> None:
         self.page, self.studio, self.shots = page, studio, 0
-        self.told: list[tuple[str, str]] = []
-        tell = studio.tell
+        self.status: list[tuple[str, str]] = []
+        notify = studio.notify
 
         def heard(title: str, body: str, bad: bool = True) -> None:
-            self.told.append((title, body))
-            tell(title, body, bad)
+            self.status.append((title, body))
+            notify(title, body, bad)
 
-        studio.tell = heard
+        studio.notify = heard
 
     def step(self, name: str) -> None:
         self.page.get_by_role("tab", name=name).click()
@@ -106,8 +106,10 @@ class Person:
     def place_of(self, key: str, index: int) -> tuple[float, float]:
         """Where a shown point of an object is on the screen."""
         client = next(iter(self.studio.server.get_clients().values()))
-        figure = self.studio.stage.figures[key]
-        place = figure.view(view_of(client)).project(figure.body.points[[index]])[0][0]
+        object_view = self.studio.scene.objects[key]
+        place = object_view.view(camera_of(client)).project(object_view.paintable.points[[index]])[
+            0
+        ][0]
         box = self.page.locator("canvas").first.bounding_box()
         return box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"]
 
@@ -144,12 +146,12 @@ class Person:
                 if done():
                     return
                 time.sleep(0.02)
-        raise AssertionError(f"{what} did nothing; said: {self.told}")
+        raise AssertionError(f"{what} did nothing; said: {self.status}")
 
     def new_region(self, name: str) -> None:
-        count = len(self.studio.desk.document.regions)
+        count = len(self.studio.editor.document.regions)
         self.press("New region")
-        until(lambda: len(self.studio.desk.document.regions) > count, "the region")
+        until(lambda: len(self.studio.editor.document.regions) > count, "the region")
         sync_api.expect(self.field("Name")).to_have_value("region-1")
         self.write("Name", name)
         until(lambda: self.studio.region == name, "the name")
@@ -170,15 +172,15 @@ class Person:
         self.page.screenshot(path=SHOTS / f"{self.shots}-{name}.png", timeout=60e3)
 
     def planned(self, region: str) -> bool:
-        painted = self.studio.desk.document.region(region)
-        plan = None if painted is None else self.studio.bench.plan(painted, 0)
+        painted = self.studio.editor.document.region(region)
+        plan = None if painted is None else self.studio.results.plan(painted, 0)
         return plan is not None and plan.checked is not None and not plan.fault
 
 
 @pytest.fixture
 def studio(tmp_path):
     server = open_server("127.0.0.1", 8480)
-    computing = SeparateComputing(nrdf.load_model)
+    computing = ChildProcessComputing(nrdf.load_model)
     made = Studio(Session(tmp_path / "session"), server, computing, ["chair"], {})
     yield made
     made.stop()
@@ -209,7 +211,7 @@ def middle_of(name: str, region: str) -> int:
 
 
 def test_all_steps(person, studio, tmp_path):
-    desk, page = studio.desk, person.page
+    editor, page = studio.editor, person.page
 
     # 1: a bundled chair; a file that is none is answered on the page.
     person.step("1 Object")
@@ -225,26 +227,26 @@ def test_all_steps(person, studio, tmp_path):
     seat, back = (middle_of("reference", name) for name in ("seat", "back-front"))
     person.step("2 Paint")
     person.new_region("seat")
-    person.click_on(REFERENCE, seat, lambda: desk.document.region("seat").mask.any())
-    small = desk.document.region("seat").mask.sum()
+    person.click_on(REFERENCE, seat, lambda: editor.document.region("seat").mask.any())
+    small = editor.document.region("seat").mask.sum()
     person.write("Radius, mm", "190")
-    until(lambda: desk.document.region("seat").mask.sum() > 2 * small, "a wider patch")
+    until(lambda: editor.document.region("seat").mask.sum() > 2 * small, "a wider patch")
     truth = bundled_chair("reference")[1]
-    assert truth["seat"][desk.document.region("seat").mask].mean() > 0.9
+    assert truth["seat"][editor.document.region("seat").mask].mean() > 0.9
     person.new_region("back")
     person.write("Radius, mm", "120")
     until(lambda: studio.radius_m == 0.12, "the radius")
-    person.click_on(REFERENCE, back, lambda: desk.document.region("back").mask.any())
-    assert truth["back-front"][desk.document.region("back").mask].mean() > 0.9, "it went through"
+    person.click_on(REFERENCE, back, lambda: editor.document.region("back").mask.any())
+    assert truth["back-front"][editor.document.region("back").mask].mean() > 0.9, "it went through"
     person.take("Brush")
 
     def size() -> int:
-        return int(desk.document.region("back").mask.sum())
+        return int(editor.document.region("back").mask.sum())
 
     grown = size()
-    above = int(np.argmin(np.linalg.norm(
-        desk.body(REFERENCE).points - desk.body(REFERENCE).points[back] - [-0.02, 0.15, 0], axis=1
-    )))  # fmt: skip
+    points = editor.paintable(REFERENCE).points
+    offset = points - points[back] - [-0.02, 0.15, 0]
+    above = int(np.argmin(np.linalg.norm(offset, axis=1)))
     person.drag_on(REFERENCE, back, above, lambda: size() > grown)
     brushed = size()
     person.press("Undo")
@@ -264,24 +266,24 @@ def test_all_steps(person, studio, tmp_path):
     person.write("Speed, mm/s", "80")
     person.choose("Region", "seat")
     person.take("Arrow")
-    behind = desk.body(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
-    behind = int(np.argmin(np.linalg.norm(desk.body(REFERENCE).points - behind, axis=1)))
+    behind = editor.paintable(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
+    behind = int(np.argmin(np.linalg.norm(editor.paintable(REFERENCE).points - behind, axis=1)))
 
     def along() -> float:
-        return desk.document.region("seat").steps[0].get("direction", [0.0])[0]
+        return editor.document.region("seat").steps[0].get("direction", [0.0])[0]
 
     person.drag_on(REFERENCE, behind, seat, lambda: along() > 0.9)
     until(lambda: person.planned("back") and person.planned("seat"), "the plans")
     person.reads("% missed")
     person.shoot("process")
 
-    # 4: both on another chair; likeness; a doubtful region is painted by hand.
+    # 4: both on another chair; likeness; a uncertain_regions region is painted by hand.
     person.step("4 Targets")
     person.press("Add the bundled chair")
-    until(lambda: "ladder-back" in studio.stage.figures, "the target")
+    until(lambda: "ladder-back" in studio.scene.objects, "the target")
     person.press("Bring the process there")
-    until(lambda: studio.bench.is_current("ladder-back"), "the transfer")
-    found = studio.bench.results["ladder-back"].transferred
+    until(lambda: studio.results.is_current("ladder-back"), "the transfer")
+    found = studio.results.by_target["ladder-back"].transfer_result
     there = bundled_chair("ladder-back")[1]
     assert there["seat"][found.regions["seat"].match.indices].mean() > 0.8
     assert all(step.path is not None for step in found.paths)
@@ -289,16 +291,20 @@ def test_all_steps(person, studio, tmp_path):
     person.shoot("target")
     person.take("Alike")
     person.click_on(REFERENCE, seat, lambda: studio.colouring == "likeness")
-    before = studio.likeness("ladder-back")
-    person.drag_on(REFERENCE, seat, back, lambda: (studio.likeness("ladder-back") != before).any())
+    before = studio.descriptor_distances("ladder-back")
+    person.drag_on(
+        REFERENCE, seat, back, lambda: (studio.descriptor_distances("ladder-back") != before).any()
+    )
     sync_api.expect(person.field("Colours")).to_have_value("likeness")
     time.sleep(1.0)  # for the picture alone
     person.shoot("likeness")
     person.take("Grow")
     there = middle_of("ladder-back", "seat")
-    person.click_on("ladder-back", there, lambda: desk.target("ladder-back").corrected)
-    until(lambda: studio.bench.is_current("ladder-back"), "the new tool path")
-    assert studio.bench.results["ladder-back"].transferred.regions["seat"].match.score == 1.0
+    person.click_on("ladder-back", there, lambda: editor.target("ladder-back").corrected)
+    until(lambda: studio.results.is_current("ladder-back"), "the new tool path")
+    assert (
+        studio.results.by_target["ladder-back"].transfer_result.regions["seat"].match.score == 1.0
+    )
     person.choose("Colours", "confidence")
     until(lambda: studio.colouring == "confidence", "the colours")
 
@@ -307,12 +313,12 @@ def test_all_steps(person, studio, tmp_path):
     with page.expect_download() as knowledge:
         person.press("Knowledge file, with the reference")
     assert knowledge.value.suggested_filename == "knowledge.zip"
-    lesson = read_bound_knowledge(desk.session.folder / "saved" / "knowledge" / "chair.yaml")
+    lesson = read_bound_knowledge(editor.session.folder / "saved" / "knowledge" / "chair.yaml")
     assert list(lesson.regions) == ["seat", "back"]
     with page.expect_download() as report:
         person.press("Report as one page")
     assert b"<table>" in Path(report.value.path()).read_bytes()
-    job = read_toolpaths(desk.session.folder / "saved" / "ladder-back" / "job")
+    job = read_toolpaths(editor.session.folder / "saved" / "ladder-back" / "job")
     assert {path.process for path in job.paths} == {"sand", "polish"}
     person.shoot("saved")
 
@@ -321,36 +327,40 @@ def test_all_steps(person, studio, tmp_path):
         person.choose("Region", "back")
         person.step("2 Paint")
         person.press("Delete")
-        until(lambda: desk.document.region("back") is None, "the deletion")
+        until(lambda: editor.document.region("back") is None, "the deletion")
         person.step("4 Targets")
         person.press("Bring the process there")
-        until(lambda: studio.bench.is_current("ladder-back"), "the transfer")
+        until(lambda: studio.results.is_current("ladder-back"), "the transfer")
         person.step("6 Robot")
         person.press("Simulate on the arm")
         person.reads("simulating the arm on ladder-back")
-        until(lambda: studio.trial.playback is not None, "the simulation", 4 * PATIENCE_S)
+        until(lambda: studio.arm_simulation.playback is not None, "the simulation", 4 * PATIENCE_S)
         person.reads("waypoints reached")
         person.choose("Speed", "30 ×")
         person.press("Play")
-        until(lambda: studio.trial.time_s > 0, "playing")
+        until(lambda: studio.arm_simulation.time_s > 0, "playing")
         person.press("Pause")
-        until(lambda: not studio.trial.player.playing, "pausing")
-        work = studio.trial.playback.times[studio.trial.playback.doing == "process"]
+        until(lambda: not studio.arm_simulation.player.playing, "pausing")
+        work = studio.arm_simulation.playback.times[
+            studio.arm_simulation.playback.doing == "process"
+        ]
         person.write("Time, s", f"{work[len(work) // 2]:.1f}")
-        until(lambda: abs(studio.trial.time_s - work[len(work) // 2]) < 0.2, "moving by hand")
+        until(
+            lambda: abs(studio.arm_simulation.time_s - work[len(work) // 2]) < 0.2, "moving by hand"
+        )
         person.reads("at work")
         time.sleep(1.0)  # for the picture alone
         person.shoot("arm")
         person.press("Simulate on the arm")
         person.press("Cancel")
-        until(lambda: not studio.trial.worker.busy, "cancelling")
-        assert studio.trial.playback is not None, "the one before is kept"
+        until(lambda: not studio.arm_simulation.worker.busy, "cancelling")
+        assert studio.arm_simulation.playback is not None, "the one before is kept"
         person.field("Show the arm").click()
         until(lambda: studio.shown() == [REFERENCE, "ladder-back"], "putting the arm away")
 
     # Nothing is lost: the page, and the program, begun again.
     page.reload()
-    person.reads("Your session is here") if desk.session.restored else person.reads("Next:")
-    kept = Session(desk.session.folder)
+    person.reads("Your session is here") if editor.session.restored else person.reads("Next:")
+    kept = Session(editor.session.folder)
     assert kept.restored and kept.document.regions[0].name == "seat"
-    assert (kept.document.region("seat").mask == desk.document.region("seat").mask).all()
+    assert (kept.document.region("seat").mask == editor.document.region("seat").mask).all()

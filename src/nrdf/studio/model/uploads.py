@@ -69,7 +69,7 @@ def bundled(name: str) -> PointCloud:
     return bundled_chair(name)[0]
 
 
-def to_paint_on(cloud: PointCloud) -> PointCloud:
+def thinned_reference(cloud: PointCloud) -> PointCloud:
     """A reference as a model works with it: the same points that it would keep."""
     if len(cloud) <= WORKING_POINTS:
         return cloud

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from nrdf.errors import ProcessError
-from nrdf.studio.worker import Worker
+from nrdf.studio.model.worker import Worker
 
 
 class Log:

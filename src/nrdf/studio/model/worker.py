@@ -52,7 +52,7 @@ class Worker:
         with self._changed:
             return self._running is not None or bool(self._waiting)
 
-    def does(self, kind: str) -> bool:
+    def has_job(self, kind: str) -> bool:
         """Whether a job of that kind runs or waits."""
         with self._changed:
             running = [] if self._running is None else [self._running]

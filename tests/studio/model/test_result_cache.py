@@ -1,0 +1,197 @@
+"""Plans on the reference, transfers to targets, and what is saved, without a browser."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+import nrdf
+from builders.taught_box import SIZE, cloud, faces
+from nrdf.errors import ProcessError, RegionError
+from nrdf.process.bound_knowledge import read_bound_knowledge
+from nrdf.process.transfer import ProcessTransfer
+from nrdf.studio.model.computing import LocalComputing
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.model.saving import save_job, save_picture, save_programs, zipped
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.teaching import bound_knowledge_of
+from nrdf.studio.model.worker import Cancelled
+from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.toolpath.file import read_toolpaths
+
+
+def silent(done, total):
+    """Progress that nobody looks at."""
+
+
+@pytest.fixture
+def results(tmp_path, untrained):
+    editor = Editor(Session(tmp_path / "session"))
+    editor.open_reference("box.ply", cloud(), "chair")
+    for name, kind in (("top", "sand"), ("front", "oil")):
+        editor.add_region(name)
+        mask = np.zeros(len(cloud()), bool)
+        mask[faces(cloud())[name]] = True
+        editor.paint(REFERENCE, name, mask)
+        editor.restart_step(name, 0, kind)
+    editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+    return ResultCache(editor, LocalComputing(lambda category: nrdf.load_model(untrained)))
+
+
+def test_plans_hold_as_long_as_what_they_are_of(results):
+    editor = results.editor
+    results.make_plans(editor.document, silent)
+    top, front = editor.document.regions
+    plan = results.plan(top, 0)
+    assert not plan.fault and plan.checked.measures.coverage > 0.9 and plan.lines
+    editor.change_numbers("top", 0, {"stepover_mm": 20.0})
+    editor.recolour_region("front", (1, 2, 3))
+    top, front = editor.document.regions
+    assert results.plan(top, 0) is None and results.plan(front, 0) is not None
+    results.make_plans(editor.document, silent)
+    assert results.plan(editor.document.regions[0], 0).checked.process.stepover_m == 0.02
+
+
+def test_a_plan_that_cannot_be_is_told_by_field_and_value(results):
+    results.editor.change_numbers("top", 0, {"feed_mm_s": 0.0})
+    results.editor.change_numbers("front", 0, {"edge_margin_mm": 900.0})
+    results.make_plans(results.editor.document, silent)
+    top, front = results.editor.document.regions
+    assert "region 'top', process 1 (sand), feed_m_s" in results.plan(top, 0).fault
+    assert "edge_margin_m is 0.9, which leaves nothing" in results.plan(front, 0).fault
+
+
+def test_planning_can_be_cancelled_and_keeps_what_is_done(results):
+    def until_second(done, total):
+        if done == 1:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        results.make_plans(results.editor.document, until_second)
+    top, front = results.editor.document.regions
+    assert results.plan(top, 0) is not None and results.plan(front, 0) is None
+
+
+def test_a_transfer_holds_until_what_was_taught_changes(results):
+    editor, seen = results.editor, []
+    results.transfer(editor.document, lambda done, total: seen.append((done, total)))
+    assert results.is_current("new") and seen[-1][0] > seen[0][0]
+    paths = results.by_target["new"].transfer_result.paths
+    assert [path.region for path in paths] == ["top", "front"]
+    first = results.by_target["new"]
+    editor.recolour_region("top", (9, 9, 9))
+    assert results.is_current("new"), "colours do not count"
+    results.transfer(editor.document, silent)
+    assert results.by_target["new"] is first
+    editor.change_numbers("top", 0, {"stepover_mm": 20.0})
+    assert not results.is_current("new")
+    results.transfer(editor.document, silent)
+    assert results.is_current("new")
+
+
+def test_a_region_painted_on_the_target_is_taken_as_it_is(results):
+    editor = results.editor
+    results.transfer(editor.document, silent)
+    body = editor.paintable("new")
+    mask = np.zeros(len(body.cloud), bool)
+    mask[faces(body.cloud)["top"]] = True
+    editor.paint("new", "top", mask)
+    assert not results.is_current("new")
+    results.transfer(editor.document, silent)
+    top = results.by_target["new"].transfer_result.regions["top"]
+    assert top.match.method == "marked" and top.match.score == 1.0
+    np.testing.assert_array_equal(top.match.indices, np.flatnonzero(mask))
+    editor.paint("new", "top", np.zeros_like(mask))
+    results.transfer(editor.document, silent)
+    assert results.by_target["new"].transfer_result.regions["top"].missing == "marked as not there"
+    assert "top" in results.by_target["new"].uncertain_regions
+    assert "look at" in title_of(editor, results, "new")
+
+
+def test_a_marked_region_must_be_taught_and_on_the_target(results, untrained):
+    lesson = bound_knowledge_of(results.editor.session.clouds, results.editor.document)
+    teacher, target = ProcessTransfer(lesson, nrdf.load_model(untrained)), cloud(seed=1)
+    with pytest.raises(RegionError, match="no taught region 'lid'; known: top, front"):
+        teacher.transfer(target, marked={"lid": [1, 2]})
+    with pytest.raises(RegionError, match=r"region 'top' on the target: .*are not on"):
+        teacher.transfer(target, marked={"top": [[9.0, 9.0, 9.0]]})
+
+
+def test_an_incomplete_document_is_refused(results):
+    results.editor.change_numbers("top", 0, {"feed_mm_s": -1.0})
+    with pytest.raises(ProcessError, match=r"region 'top', process 1 \(sand\), feed_m_s"):
+        results.transfer(results.editor.document, silent)
+
+
+def test_likeness_is_greatest_around_the_point_itself(results):
+    document = results.editor.document
+    described = results.described(document, silent)
+    away = described.distances(17)[REFERENCE]
+    # An untrained C finds each of a shape's points on the same shape again.
+    assert away.argmin() == 17 and away[17] == pytest.approx(0, abs=1e-5)
+    assert described.distances(18)[REFERENCE].argmin() == 18, "for another point at once"
+    assert list(described.objects) == [REFERENCE]
+    results.transfer(document, silent)
+    found = results.described(document, silent)
+    assert found.distances(17)["new"].shape == (len(results.editor.paintable("new").points),)
+    assert found.objects[REFERENCE] is described.objects[REFERENCE], "computed once"
+
+
+def test_what_is_drawn(results):
+    editor = results.editor
+    bare = colours_of(editor, results, "new")
+    assert (bare == bare[0]).all() and not lines_of(editor, results, "new")
+    results.make_plans(editor.document, silent)
+    results.transfer(editor.document, silent)
+    assert set(lines_of(editor, results, REFERENCE)) == {"top", "front"}
+    painted = colours_of(editor, results, REFERENCE)
+    assert (painted[editor.document.region("top").mask] != bare[0]).any()
+    assert direction_of(editor, "top", 0) is None
+    editor.change_step("top", 0, direction=[1.0, 0.0, 0.0])
+    start, stop = direction_of(editor, "top", 0)
+    np.testing.assert_allclose((stop - start) / np.linalg.norm(stop - start), [1, 0, 0])
+    sure = colours_of(editor, results, "new", by_confidence=True)
+    assert len(sure) == len(editor.paintable("new").points)
+
+
+def test_overlaps_are_dark(results):
+    from nrdf.studio.scene.colours import SHARED
+
+    editor = results.editor
+    editor.paint(REFERENCE, "front", editor.document.region("top").mask)
+    drawn = colours_of(editor, results, REFERENCE)
+    assert (drawn[editor.document.region("top").mask] == SHARED.astype(np.uint8)).all()
+
+
+def test_what_is_saved_can_be_read_by_the_command_line(results):
+    editor = results.editor
+    results.make_plans(editor.document, silent)
+    results.transfer(editor.document, silent)
+    result = results.by_target["new"]
+    place = save_job(editor, "new", result, {"command": "nrdf studio"})
+    assert save_job(editor, "new", result, {}) == place, "it can be saved again"
+    assert len(read_toolpaths(place).paths) == 2 and (place / "report.html").is_file()
+    assert list(read_bound_knowledge(place / "knowledge.yaml").regions) == ["top", "front"]
+    programs = save_programs(editor, "new", result, ("csv", "urscript"))
+    names = zipfile.ZipFile(BytesIO(zipped(programs))).namelist()
+    assert any(name.endswith(".csv") for name in names)
+    assert all(name.startswith("programs/") for name in names)
+    assert save_picture(editor, results).read_bytes().startswith(b"\x89PNG")
+    json.loads((place / "report.json").read_text())
+
+
+def test_a_large_target_is_shown_thinned_and_painted_whole(results):
+    editor = results.editor
+    editor.add_target("large.ply", cloud(SIZE, 20_000, seed=2))
+    body = editor.paintable("large")
+    assert len(body.points) < len(body.cloud)
+    mask = body.points[:, 1] > body.high[1] - 1e-6
+    whole = body.to_all(mask)
+    truth = body.cloud.points[:, 1] > body.high[1] - 1e-6
+    assert (whole == truth).mean() > 0.98 and (body.to_shown(whole) == mask).all()
