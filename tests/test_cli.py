@@ -19,7 +19,7 @@ from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.io.ply import read_header, read_scalars
 from nrdf.io.result_folder import MANIFEST
 from nrdf.process.bound_knowledge import read_bound_knowledge
-from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.process.transfer_result import MIN_CONFIDENCE
 
 VERBS = sorted(cli.verbs())
 

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
     from nrdf.io.inputs import as_cloud
     from nrdf.process.knowledge import Knowledge
-    from nrdf.process.transfer import ProcessTransfer, TransferResult, load_process
+    from nrdf.process.transfer import ProcessTransfer, load_process
+    from nrdf.process.transfer_result import TransferResult
     from nrdf.regions.match import Match
     from nrdf.regions.model import Model, load_model
     from nrdf.regions.reference import EncodedReference
@@ -77,7 +78,8 @@ _HOMES = {
     "Match": "nrdf.regions.match",
     **dict.fromkeys(("Model", "load_model"), "nrdf.regions.model"),
     "EncodedReference": "nrdf.regions.reference",
-    **dict.fromkeys(("ProcessTransfer", "TransferResult", "load_process"), "nrdf.process.transfer"),
+    **dict.fromkeys(("ProcessTransfer", "load_process"), "nrdf.process.transfer"),
+    "TransferResult": "nrdf.process.transfer_result",
     "Knowledge": "nrdf.process.knowledge",
     "align": "nrdf.scans.target",
     "write_job": "nrdf.reports.job_folder",

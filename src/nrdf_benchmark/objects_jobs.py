@@ -25,7 +25,8 @@ from nrdf.io.cloud import PointCloud, read_cloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
-from nrdf.process.transfer import ProcessTransfer, TransferResult
+from nrdf.process.transfer import ProcessTransfer
+from nrdf.process.transfer_result import TransferResult
 from nrdf.reports.job_folder import write_job
 from nrdf.toolpath.file import read_toolpaths
 from nrdf_benchmark.objects_match import Finder, Settings, finder

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.io.atomic import write_atomically
-from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf_benchmark.methods import METHODS
 from nrdf_benchmark.objects_jobs import JobFigure, jobs_lines
 from nrdf_benchmark.objects_match import PairFigure

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.io.file_names import spreadsheet_text
-from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf_benchmark.objects_match import PairFigure, PartFigure, Pose
 from nrdf_benchmark.objects_pairs import ABSENT, HIDDEN, LEAST_SHARE, THERE
 

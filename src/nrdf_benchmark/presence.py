@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 from nrdf.errors import DataError
 from nrdf.io.atomic import output_errors, write_atomically
 from nrdf.io.files import read_file
-from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf.regions.presence import SURELY_ABSENT, Evidence
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.families import get_family

@@ -20,7 +20,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.correspondence import Correspondence
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.transfer import ProcessTransfer
-from nrdf.process.warp import carry
+from nrdf.process.warp import warp_segments
 from nrdf.regions.model import Model
 from nrdf.shapes.families import Family, SurfaceSample, get_family
 from nrdf.shapes.families.member import Member
@@ -86,8 +86,8 @@ def evaluate_warp(
         there = target.sample_surface(CLOUD_POINTS, rng)
         teacher = ProcessTransfer(_lesson(category, family, here), model)
         embedded = model.encode(PointCloud(there.points, there.normals))
-        way = Correspondence(teacher.reference, embedded)
-        matches = teacher.taught.retrieve_all(teacher.bound_knowledge.regions, embedded)
+        way = Correspondence(teacher.reference_surface, embedded)
+        matches = teacher.reference.retrieve_all(teacher.bound_knowledge.regions, embedded)
         named = family.region_of(there.coordinates)
         truth = _Truth(reference, target, rng)
         found = []
@@ -96,10 +96,10 @@ def evaluate_warp(
             confidence.append(matches[name].score)
             present.append(has >= _PRESENT)
             if has >= _PRESENT:
-                carried = _carried(teacher, way, name, truth)
-                if carried is not None:
-                    found.append(carried[0])
-                    counts += carried[1]
+                warped = _warped(teacher, way, name, truth)
+                if warped is not None:
+                    found.append(warped[0])
+                    counts += warped[1]
         errors.append(np.concatenate(found) if found else np.zeros(0))
         if progress is not None:
             progress(number + 1, pairs)
@@ -146,20 +146,20 @@ class _Truth:
         return self._there[nearest] + points - self._points[nearest], self._exists[nearest]
 
 
-def _carried(
+def _warped(
     teacher: ProcessTransfer, way: Correspondence, name: str, truth: _Truth
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Errors (w,) of one region's carried waypoints; and how many were lost of how many that
+    """Errors (w,) of one region's warped waypoints; and how many were lost of how many that
     exist, invented of how many that do not. None where no raster fits the region."""
     try:
-        lines = teacher.lines(name, 0)
+        lines = teacher.reference_segments(name, 0)
     except ProcessError:
         return None
-    carried, _ = carry(way, lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
+    warped, _ = warp_segments(way, lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
     errors, counts = [], np.zeros(4)
     arrived = [np.full((len(line.positions), 3), np.nan) for line in lines]
-    for line in carried:
-        arrived[line.taught][line.waypoints] = line.positions
+    for line in warped:
+        arrived[line.line][line.source] = line.positions
     for planned, there in zip(lines, arrived, strict=True):
         outward = -_tool_z(planned.quaternions_xyzw)
         exact, exists = truth.places(planned.positions, outward)

@@ -9,7 +9,7 @@ from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.strategy import tool_path
-from nrdf.process.transfer import FoundRegion, PathResult, TransferResult
+from nrdf.process.transfer_result import FoundRegion, PathResult, TransferResult
 from nrdf.regions.match import Match
 from nrdf.toolpath.metrics import Measures
 from nrdf.toolpath.types import Segment

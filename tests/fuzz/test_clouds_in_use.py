@@ -57,7 +57,7 @@ def test_embedding_and_retrieval(model, teacher, cloud):
 
     def retrieve():
         target = PointCloud(points, normals, sensors=sensors)
-        found = teacher.taught.retrieve_all({"top": np.arange(50)}, target)
+        found = teacher.reference.retrieve_all({"top": np.arange(50)}, target)
         assert np.isfinite(found["top"].confidence).all()
         assert torch.isfinite(model.encode(target).z).all()
 

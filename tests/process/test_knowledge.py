@@ -62,7 +62,7 @@ def test_several_processes_keep_their_order():
     assert [process.label for process in found] == ["sand", "oil", "sand, fine"]
 
 
-def test_taught_lines_are_warped_and_strategies_planned_anew_unless_asked_otherwise():
+def test_taught_segments_are_warped_and_strategies_planned_anew_unless_asked_otherwise():
     assert Process.model_validate(TAUGHT).transfer_mode == "warp"
     assert Process.model_validate(SAND).transfer_mode == "replan"
     assert Process.model_validate({**SAND, "transfer": "warp"}).transfer_mode == "warp"

@@ -20,7 +20,7 @@ from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.transfer import ProcessTransfer, working
-from nrdf.process.warp import carry
+from nrdf.process.warp import warp_segments
 
 OFFSET = np.array([3.0, -1.0, 0.5])
 OIL = {**SAND, "kind": "oil", "order": -1, "parameters": {"oil": "linseed"}}
@@ -68,15 +68,15 @@ def test_an_object_in_any_pose_is_worked_as_one_in_the_canonical_orientation(mod
 
 
 def test_a_target_may_be_a_file_or_an_array(model, tmp_path):
-    teacher = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
+    process = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
     target = cloud(seed=1)
     write_cloud(tmp_path / "new.ply", target)
-    from_file = teacher.transfer(tmp_path / "new.ply")
+    from_file = process.transfer(tmp_path / "new.ply")
     np.testing.assert_array_equal(from_file.target.points, target.points)
-    from_array = teacher.transfer(target.points, unit="m")
+    from_array = process.transfer(target.points, unit="m")
     np.testing.assert_array_equal(from_array.target.points, target.points)
     with pytest.raises(CloudError, match=r"the target cannot be dict.*accepted are"):
-        teacher.transfer({})
+        process.transfer({})
 
 
 def process_segments(step):
@@ -202,30 +202,30 @@ def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
     deeper = target.points - [0.0, 0.004, 0.0] * (target.normals[:, 1:2] > 0.5)
     points = np.concatenate([deeper, deeper + 1e-4])
     whole = PointCloud(points, np.concatenate([target.normals] * 2))
-    teacher = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
-    (step,) = teacher.transfer(target, whole=whole).paths
+    process = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
+    (step,) = process.transfer(target, whole=whole).paths
     assert step.measures.judged_by == f"all {2 * len(target)} points as given"
     assert step.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
-    (alone,) = teacher.transfer(target).paths
+    (alone,) = process.transfer(target).paths
     assert alone.measures.judged_by == f"all {len(target)} points as given"
     assert alone.measures.true_distance_95_m < 1e-3
-    (bare,) = teacher.transfer(target, whole=PointCloud(points)).paths  # without normals
+    (bare,) = process.transfer(target, whole=PointCloud(points)).paths  # without normals
     assert bare.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
 
 
-def test_a_carried_step_that_grew_is_said(model, monkeypatch):
-    def torn(way, lines, radius):
-        carried, lost = carry(way, lines, radius)
-        first = carried[0]
+def test_a_warped_step_that_grew_is_reported(model, monkeypatch):
+    def torn(correspondence, segments, radius):
+        warped, lost = warp_segments(correspondence, segments, radius)
+        first = warped[0]
         keep = np.r_[0:2, len(first.positions) - 1]
         parts = {n: getattr(first, n)[keep] for n in ("positions", "quaternions_xyzw", "normals")}
-        return (replace(first, **parts), *carried[1:]), lost
+        return (replace(first, **parts), *warped[1:]), lost
 
-    teacher = ProcessTransfer(bound_knowledge({"front": [TAUGHT]}), model)
-    (step,) = teacher.transfer(cloud(seed=1)).paths
+    process = ProcessTransfer(bound_knowledge({"front": [TAUGHT]}), model)
+    (step,) = process.transfer(cloud(seed=1)).paths
     assert not any("a step of" in warning for warning in step.warnings)
-    monkeypatch.setattr("nrdf.process.transfer.carry", torn)
-    (step,) = teacher.transfer(cloud(seed=1)).paths
+    monkeypatch.setattr("nrdf.process.transfer.warp_segments", torn)
+    (step,) = process.transfer(cloud(seed=1)).paths
     (warning,) = (w for w in step.warnings if "a step of" in w)
     assert re.match(
         r"a step of 5\d\d.* mm between .* the longest on the reference is 50 mm", warning
@@ -273,7 +273,7 @@ def test_points_in_use_are_found_again(model):
     np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
 
 
-def test_taught_spots_are_carried_one_by_one(model):
+def test_taught_spots_are_warped_one_by_one(model):
     spots = [{"positions_m": [[0.25, 0.1, z]]} for z in (-0.2, 0.0, 0.2)]
     taught = bound_knowledge({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
     step = ProcessTransfer(taught, model).transfer(cloud(seed=1)).paths[0]

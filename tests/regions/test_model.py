@@ -14,7 +14,7 @@ from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.field.encoded_cloud import encoder_subset
 from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud
-from nrdf.process.transfer import MIN_CONFIDENCE
+from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf.regions.model import Model
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.families import get_family

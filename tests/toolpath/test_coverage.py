@@ -13,8 +13,9 @@ from nrdf.errors import ProcessError
 from nrdf.surface.given_surface import MeshSurface
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure
-from nrdf.toolpath.planner import drive
+from nrdf.toolpath.planner import add_approach_retract
 from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.types import Segment
 
 STRATEGY = Strategy(stepover_m=0.04, spacing_m=0.01, tool_radius_m=0.025, feed_m_s=0.1)
 SURFACE = Surface(*board(spacing=0.008))
@@ -22,14 +23,16 @@ REGION = np.arange(SURFACE.size)
 DOWN = Rotation.from_euler("x", np.pi)
 
 
+def process_segment(positions, turn):
+    held = np.tile(turn.as_quat(), (len(positions), 1))
+    return Segment("process", 0, positions, held, 0.1)
+
+
 def lines(*levels: float, x=(0.0, 0.4), z: float = 0.0, turn: Rotation = DOWN, strategy=STRATEGY):
     """Straight lines along x at heights y, as driven."""
     along = np.linspace(*x, 41)
-    drawn = [
-        (np.c_[along, np.full(41, y), np.full(41, z)], np.tile(turn.as_quat(), (41, 1)))
-        for y in levels
-    ]
-    return drive(drawn, [np.tile([0.0, 0.0, 1.0], (41, 1))] * len(levels), strategy)
+    drawn = [process_segment(np.c_[along, np.full(41, y), np.full(41, z)], turn) for y in levels]
+    return add_approach_retract(drawn, [np.tile([0.0, 0.0, 1.0], (41, 1))] * len(levels), strategy)
 
 
 def test_coverage_is_the_share_of_the_area_within_the_tool_radius():
@@ -151,11 +154,11 @@ def test_spacing_is_measured_along_the_surface():
         turn = Rotation.from_matrix(
             np.stack([[0, 0, 1], np.cross(-outward, [0, 0, 1]), -outward], 1)
         )
-        drawn.append(
-            (0.06 * outward + np.c_[np.zeros((27, 2)), along], np.tile(turn.as_quat(), (27, 1)))
-        )
+        drawn.append(process_segment(0.06 * outward + np.c_[np.zeros((27, 2)), along], turn))
         normals.append(np.tile(outward, (27, 1)))
-    found = measure(surface, np.arange(surface.size), STRATEGY, drive(drawn, normals, STRATEGY))
+    found = measure(
+        surface, np.arange(surface.size), STRATEGY, add_approach_retract(drawn, normals, STRATEGY)
+    )
     assert found.line_spacing_mean_m == pytest.approx(0.06, rel=0.02)  # the chord is 0.0575
 
 

@@ -13,7 +13,7 @@ from nrdf.errors import ProcessError
 from nrdf.shapes.families import get_family
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure
-from nrdf.toolpath.planner import drive, plan
+from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.strategy import TRAJECTORIES, Strategy
 from nrdf.toolpath.types import Segment
 
@@ -187,7 +187,11 @@ def test_passes_go_back_and_forth_and_the_tool_turns_round():
 def test_given_lines_are_driven_as_they_are():
     positions = np.array([[0.0, 0.0, 0.0]])
     quaternions = Rotation.from_euler("x", np.pi).as_quat()[None]
-    segments = drive([(positions, quaternions)], [np.array([[0.0, 0.0, 1.0]])], STRATEGY)
+    segments = add_approach_retract(
+        [Segment("process", 0, positions, quaternions, 0.1)],
+        [np.array([[0.0, 0.0, 1.0]])],
+        STRATEGY,
+    )
     assert [segment.kind for segment in segments] == ["approach", "process", "retract"]
     np.testing.assert_array_equal(segments[1].quaternions_xyzw, quaternions)
     np.testing.assert_allclose(segments[0].positions[0], [0.0, 0.0, 0.05])

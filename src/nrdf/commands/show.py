@@ -21,7 +21,8 @@ from nrdf.commands.console import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from nrdf.process.transfer import ProcessTransfer, TransferResult
+    from nrdf.process.transfer import ProcessTransfer
+    from nrdf.process.transfer_result import TransferResult
     from nrdf.viz.picture import Panel
 
 EXPORTED = ("urscript", "csv")
@@ -237,7 +238,7 @@ def _taught_panel(title: str, teacher: ProcessTransfer) -> Panel:
 
     lines: dict[str, list[np.ndarray]] = {}
     for region, number, _ in teacher.steps():
-        lines.setdefault(region, []).extend(teacher.contacts(region, number))
+        lines.setdefault(region, []).extend(teacher.reference_contacts(region, number))
     lesson = teacher.bound_knowledge
     note = f"{len(lesson.regions)} regions, each with a process of its own, taught"
     return Panel(title, lesson.cloud.points, None, lesson.regions, note, lines)

@@ -109,7 +109,8 @@ def transfer(
     with output_folder(out, overwrite, [knowledge, target, *region, model]) as folder:
         import nrdf
         from nrdf.process.bound_knowledge import files_of, read_bound_knowledge, unit_and_warnings
-        from nrdf.process.transfer import MIN_CONFIDENCE, ProcessTransfer
+        from nrdf.process.transfer import ProcessTransfer
+        from nrdf.process.transfer_result import MIN_CONFIDENCE
         from nrdf.reports.job_folder import write_job_files
 
         lesson = read_bound_knowledge(knowledge)

@@ -18,12 +18,12 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
 from nrdf.process.path_warnings import measure_warnings
 from nrdf.process.strategy import strategy_of
-from nrdf.process.taught_paths import normals_under, taught_lines
+from nrdf.process.taught_paths import normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import Measures, measure
-from nrdf.toolpath.planner import drive, plan
+from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.types import Segment
 
 
@@ -96,9 +96,8 @@ def check_process(
             _check_spacing(surface, region, process)
             segments = plan(surface, region, strategy)
         else:
-            lines = taught_lines(process, surface)
-            drawn = [(line.positions, line.quaternions_xyzw) for line in lines]
-            segments = drive(drawn, normals_under(surface, lines), strategy)
+            taught = taught_segments(process, surface)
+            segments = add_approach_retract(taught, normals_under(surface, taught), strategy)
         measures = measure(surface, region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))

@@ -1,4 +1,4 @@
-"""The way from a reference's surface to a target's: places on it, and directions."""
+"""Points and directions mapped from a reference's surface to a target's."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.surface.surface import SAME_SIDE, Surface, unit
 
 FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
-"""A waypoint has a counterpart where C's place is at most so far off the target's points, in all,
-and beyond an edge or in a hole, as shares of the longest side, not counting the distance between
-points; and where C trusts it."""
-_AROUND = 12  # points that tell whether a place is on the surface between them
-_ANCHORS = 1200  # points of the reference whose places are settled
-_BLENDED, _BLEND = 8, 0.005  # anchors that a place follows, and the distance that softens it
-_SETTLING = RegistrationSettings(
+"""A waypoint has a counterpart where C trusts the point that it gives, and where that point is at
+most so far off the target's points: in all, and beyond an edge or in a hole. Shares of the longest
+side, the distance between points not counted."""
+_AROUND = 12  # points that tell whether a point is on the surface between them
+_ANCHORS = 1200  # points of the reference whose positions are refined
+_BLENDED, _BLEND = 8, 0.005  # anchors that a point follows, and the distance that softens it
+_REGISTRATION = RegistrationSettings(
     iterations=8,
     radius_start=0.3,
     radius_end=0.15,
@@ -36,63 +36,67 @@ _SETTLING = RegistrationSettings(
 """Chosen on unseen family pairs (`nrdf eval warp`)."""
 
 
-class TaughtSurface:
-    """A reference as waypoints are carried from it: as the field sees it, and as a surface."""
+class ReferenceSurface:
+    """A reference that waypoints are warped from: encoded, and as a surface."""
 
-    def __init__(self, taught: EncodedReference) -> None:
-        self.taught = taught
-        self.surface = surface_of(taught.reference)
+    def __init__(self, encoded: EncodedReference) -> None:
+        self.encoded = encoded
+        self.surface = surface_of(encoded.reference)
 
     @cached_property
     def mirrored(self) -> EncodedReference:
         """The reference's mirror image, left for right; its own frame is the canonical one."""
-        return EncodedReference(
-            self.taught.model, _mirrored(self.taught.model, self.taught.reference)
-        )
+        model = self.encoded.model
+        return EncodedReference(model, _mirrored(model, self.encoded.reference))
 
     @cached_property
     def anchors(self) -> np.ndarray:
-        """Even points (a,) of the working cloud whose places on a target are settled."""
-        return downsample(self.taught.reference.points, _ANCHORS, np.random.default_rng(0))
+        """Evenly spread working points (a,) whose positions on a target are refined."""
+        return downsample(self.encoded.reference.points, _ANCHORS, np.random.default_rng(0))
 
     @cached_property
     def template(self) -> RegistrationTemplate:
         """The anchors, ready to be moved."""
-        reference, at = self.taught.reference, self.anchors
-        return RegistrationTemplate(reference.points[at], reference.normals[at], _SETTLING)
+        reference, at = self.encoded.reference, self.anchors
+        return RegistrationTemplate(reference.points[at], reference.normals[at], _REGISTRATION)
 
     @cached_property
     def tree(self) -> cKDTree:
         """The anchors in position and normal."""
-        reference, at = self.taught.reference, self.anchors
+        reference, at = self.encoded.reference, self.anchors
         return cKDTree(
             oriented_features(reference.points[at], reference.normals[at], NORMAL_WEIGHT)
         )
 
 
 class Correspondence:
-    """The way from a reference's surface to a target's, both in metres.
+    """The mapping from a reference's surface to a target's, both in metres.
 
-    C is asked twice, the second time with both objects mirrored in z, which is an object of the
-    category as well; the mean is better than either. Then its places are settled: a smooth, small
-    displacement, as in registration, brings the whole mapped reference and the target closer, so
-    that edges come to lie on edges.
+    The inverse descriptor function C is asked twice, the second time with both objects mirrored in
+    z, which gives an object of the category as well; the mean is better than either. A smooth,
+    small displacement, as in registration, then brings the whole mapped reference closer to the
+    target, so that edges come to lie on edges.
     """
 
-    def __init__(self, reference: TaughtSurface, embedded: EncodedCloud) -> None:
-        self.reference, self.embedded = reference, embedded
-        self.target = surface_of(embedded)
-        features = oriented_features(embedded.points, embedded.normals, NORMAL_WEIGHT)
+    def __init__(self, reference: ReferenceSurface, target: EncodedCloud) -> None:
+        self.reference, self.target = reference, target
+        self.target_surface = surface_of(target)
+        features = oriented_features(target.points, target.normals, NORMAL_WEIGHT)
         self._tree = cKDTree(features)
+
+    @property
+    def scale(self) -> float:
+        """How much larger the target is than the reference, by their longest sides."""
+        return self.target.pose.scale / self.reference.encoded.reference.pose.scale
 
     @cached_property
     def _mirrored(self) -> EncodedCloud:
-        return _mirrored(self.reference.taught.model, self.embedded)
+        return _mirrored(self.reference.encoded.model, self.target)
 
     def _mapped(self, points: np.ndarray, normals: np.ndarray) -> Mapped:
-        """The mean of what C says of places (m, 3) of the reference and of their mirror images."""
-        taught, reference = self.reference.taught, self.reference.taught.reference
-        one = taught.map_places(points, normals, self.embedded)
+        """The mean of what C says of points (m, 3) of the reference and of their mirror images."""
+        encoded, reference = self.reference.encoded, self.reference.encoded.reference
+        one = encoded.map_places(points, normals, self.target)
         other = self.reference.mirrored.map_places(
             LEFT_FOR_RIGHT * reference.canonical(points),
             LEFT_FOR_RIGHT * reference.canonical_normals(normals),
@@ -106,29 +110,27 @@ class Correspondence:
         )
 
     @cached_property
-    def _settled(self) -> np.ndarray:
-        """Displacement (a, 3) of each anchor's place, canonical."""
-        reference, embedded = self.reference, self.embedded
-        whole, anchors = reference.taught.reference, reference.anchors
+    def _registered(self) -> np.ndarray:
+        """Displacement (a, 3), canonical, that brings each mapped anchor onto the target."""
+        reference, target = self.reference, self.target
+        whole, anchors = reference.encoded.reference, reference.anchors
         mapped = self._mapped(
             whole.original(whole.points[anchors]), whole.original_normals(whole.normals[anchors])
         )
         start, facing = mapped.points, mapped.normals
-        at = downsample(embedded.points, 2 * _ANCHORS, np.random.default_rng(1))
-        moved = reference.template.register(
-            embedded.points[at], embedded.normals[at], (start, facing)
-        )
+        at = downsample(target.points, 2 * _ANCHORS, np.random.default_rng(1))
+        moved = reference.template.register(target.points[at], target.normals[at], (start, facing))
         return np.asarray(moved.points - start)
 
-    def places(
+    def map_points(
         self, points: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where places (m, 3) of the reference's surface, with normals (m, 3), are on the target.
+        """Where points (m, 3) of the reference's surface, with normals (m, 3), are on the target.
 
-        Returns places on its smooth surface (m, 3), normals there (m, 3), and whether the place
-        exists (m,): the field trusts it, and it lies near the surface.
+        Returns points on its smooth surface (m, 3), normals there (m, 3), and whether the point
+        has a counterpart (m,): the field trusts it, and it lies near the surface.
         """
-        embedded, whole = self.embedded, self.reference.taught.reference
+        target, whole = self.target, self.reference.encoded.reference
         mapped = self._mapped(points, normals)
         asked = oriented_features(
             whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
@@ -136,26 +138,26 @@ class Correspondence:
         distance, near = self.reference.tree.query(asked, _BLENDED)
         weight = 1.0 / (distance + _BLEND) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
-        arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._settled[near])
+        arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._registered[near])
         nearest = self._tree.query(oriented_features(arrived, mapped.normals, NORMAL_WEIGHT))[1]
-        start = embedded.original(embedded.points[nearest])
-        outward = embedded.original_normals(embedded.normals[nearest])
-        offset = embedded.original(arrived) - start
+        start = target.original(target.points[nearest])
+        outward = target.original_normals(target.normals[nearest])
+        offset = target.original(arrived) - start
         sideways = offset - np.einsum("ma,ma->m", offset, outward)[:, None] * outward
         beyond = self._beyond(start, sideways, outward)
         kept = start + sideways * (1.0 - beyond / np.maximum(lengths(sideways), 1e-12))[:, None]
-        found, found_normals = self.target.project(kept, outward)
-        size, spacing = embedded.pose.scale, self.target.spacing
+        found, found_normals = self.target_surface.project(kept, outward)
+        size, spacing = target.pose.scale, self.target_surface.spacing
         exists = lengths(offset) <= FARTHEST * size + spacing
         exists &= beyond <= BEYOND * size + spacing
         return found, found_normals, exists & (mapped.trust >= LEAST_TRUST)
 
     def _beyond(self, start: np.ndarray, sideways: np.ndarray, outward: np.ndarray) -> np.ndarray:
-        """How far (m,) places `start + sideways` (m, 3) lie off the edge of the target's points.
+        """How far (m,) points `start + sideways` (m, 3) lie off the edge of the target's cloud.
 
-        A place with points of its side around and ahead of it is on the surface between them.
+        A point with points of its side around and ahead of it is on the surface between them.
         """
-        target, length = self.target, lengths(sideways)
+        target, length = self.target_surface, lengths(sideways)
         near = np.arange(1, min(_AROUND, len(target.points)) + 1)
         distance, near = target.tree.query(start + sideways, near)
         alike = np.einsum("mka,ma->mk", target.normals[near], outward) > SAME_SIDE
@@ -164,21 +166,21 @@ class Correspondence:
         reach = np.where(alike, ahead, 0.0).max(axis=1)
         return np.maximum(length - np.maximum(reach, 0.0), 0.0)
 
-    def direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    def map_direction(self, region: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """A direction (3,) at a region of the reference, unit length, as it is on the target.
 
         region: (k,) indices into the reference's cloud. The smooth map between the two regions is
         taken as affine; across the surface, where points do not tell, as a turn and a scale.
         """
-        taught = self.reference.taught
-        here = taught.reference.cloud.points[region]
-        there = self.embedded.original(taught.map_points(region, self.embedded).points)
+        encoded = self.reference.encoded
+        here = encoded.reference.cloud.points[region]
+        there = self.target.original(encoded.map_points(region, self.target).points)
         here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
         spread = here.T @ here
         size = float(np.trace(spread))
         if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
-            canonical = taught.reference.canonical_normals(np.asarray(direction, float))
-            return unit(self.embedded.original_normals(canonical))
+            canonical = encoded.reference.canonical_normals(np.asarray(direction, float))
+            return unit(self.target.original_normals(canonical))
         turn, _ = Rotation.align_vectors(there, here)
         similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
         ridge = 0.05 * size / 3.0 * np.eye(3)
@@ -186,16 +188,17 @@ class Correspondence:
         return unit(affine @ unit(np.asarray(direction, float)))
 
 
-def surface_of(embedded: EncodedCloud) -> Surface:
-    """The surface of a cloud in metres, of the points that the field works on."""
-    return Surface(embedded.original(embedded.points), embedded.original_normals(embedded.normals))
+def surface_of(encoded: EncodedCloud) -> Surface:
+    """The surface of an encoded cloud, of its working points, in the cloud's own frame and unit."""
+    return Surface(encoded.original(encoded.points), encoded.original_normals(encoded.normals))
 
 
-def _mirrored(model: CloudEncoder, embedded: EncodedCloud) -> EncodedCloud:
-    """The mirror image of what the field works on, left for right, in the canonical frame."""
-    image = PointCloud(LEFT_FOR_RIGHT * embedded.points, LEFT_FOR_RIGHT * embedded.normals)
+def _mirrored(model: CloudEncoder, encoded: EncodedCloud) -> EncodedCloud:
+    """The mirror image of an encoded cloud, left for right, in the canonical frame."""
+    image = PointCloud(LEFT_FOR_RIGHT * encoded.points, LEFT_FOR_RIGHT * encoded.normals)
     return model.encode(image, Similarity(np.eye(3), np.zeros(3), 1.0))
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (m,) of vectors (m, 3)."""
     return np.linalg.norm(vectors, axis=1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION, NON_NEGATIVE
-from nrdf.process.transfer import FoundRegion, TransferResult
+from nrdf.process.transfer_result import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
 from nrdf.toolpath.metrics import Measures
 

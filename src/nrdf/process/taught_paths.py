@@ -1,9 +1,8 @@
-"""EncodedReference lines of waypoints on the reference, and what of its surface lies under them."""
+"""Taught waypoints on the reference, and the surface under a tool."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,46 +13,47 @@ from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions, travel_of
+from nrdf.toolpath.types import Segment
 
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
 _FACING = 0.1  # cosine above which a side faces a tool: the side round a square corner does not
 
 
-@dataclass(frozen=True)
-class TaughtLine:
-    """A line of waypoints: positions (n, 3), m, and quaternions_xyzw (n, 4), tool to object."""
+def taught_segments(process: Process, surface: Surface) -> tuple[Segment, ...]:
+    """A process segment for each line of a taught process.
 
-    positions: np.ndarray
-    quaternions_xyzw: np.ndarray
-
-
-def taught_lines(process: Process, surface: Surface) -> tuple[TaughtLine, ...]:
-    """The lines of a taught process; tools without orientation follow the reference's surface.
-
-    Raises ProcessError, naming line and waypoint, for one that is farther from the surface than
-    its stand-off and 2 % of the object's longest side.
+    Where a line gives no orientations, the tool follows the reference's surface. Raises
+    ProcessError, naming line and waypoint, for one that is farther from the surface than its
+    stand-off and 2 % of the object's longest side.
     """
     allowed = process.standoff_m + ON_REFERENCE * float(np.ptp(surface.points, axis=0).max())
-    lines = []
-    for number, line in enumerate(process.waypoints or (), 1):
+    segments = []
+    for number, line in enumerate(process.waypoints or ()):
         positions = np.array(line.positions_m, float)
         # What lies between points is on the surface.
         away = np.maximum(surface.tree.query(positions)[0] - surface.spacing, 0.0)
         if (away > allowed).any():
             worst = int(away.argmax())
             raise ProcessError(
-                f"waypoints: number {worst + 1} of line {number} is "
+                f"waypoints: number {worst + 1} of line {number + 1} is "
                 f"{in_words('away_m', float(away[worst]))} from the reference; at most "
                 f"{in_words('allowed_m', allowed)} is allowed with standoff_m "
                 f"{process.standoff_m:g}. Is it in the reference's frame, in metres?"
             )
-        lines.append(TaughtLine(positions, _turns(line, positions, process, surface)))
-    return tuple(lines)
+        quaternions = _quaternions(line, positions, process, surface)
+        segments.append(
+            Segment(
+                "process", number, positions, quaternions,
+                process.feed_m_s, process.force_n, process.dwell_s,
+            )
+        )  # fmt: skip
+    return tuple(segments)
 
 
-def _turns(
+def _quaternions(
     line: TaughtSegment, positions: np.ndarray, process: Process, surface: Surface
 ) -> np.ndarray:
+    """The orientations (n, 4) of a taught line, given or from the surface."""
     if line.quaternions_xyzw is not None:
         return np.array(line.quaternions_xyzw, float)
     nearest = surface.tree.query(positions)[1]
@@ -65,7 +65,7 @@ def _turns(
     return tool_quaternions(travel, normals, process.lead_rad, process.tilt_rad)
 
 
-def feet_under(
+def surface_under(
     surface: Surface, positions: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The smooth surface under tools at positions (m, 3), and its normals there, each (m, 3).
@@ -85,10 +85,19 @@ def feet_under(
     return surface.project(start + sideways, normals)
 
 
-def normals_under(surface: Surface, lines: Sequence[TaughtLine]) -> list[np.ndarray]:
-    """Outward normals (n, 3) of the surface under each line's tools."""
+def normals_under(surface: Surface, segments: Sequence[Segment]) -> list[np.ndarray]:
+    """Outward normals (n, 3) of the surface under the tool at each segment's waypoints."""
     found = []
-    for line in lines:
-        axes = -Rotation.from_quat(line.quaternions_xyzw).as_matrix()[:, :, 2]
-        found.append(feet_under(surface, line.positions, axes)[1])
+    for segment in segments:
+        axes = -Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
+        found.append(surface_under(surface, segment.positions, axes)[1])
     return found
+
+
+def contact_points(
+    positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float
+) -> np.ndarray:
+    """Where tools at positions (n, 3) touch or point at the surface, (n, 3): a stand-off ahead of
+    the tool centre point, along tool z."""
+    along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
+    return np.asarray(positions + standoff_m * along)

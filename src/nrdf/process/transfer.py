@@ -1,6 +1,6 @@
-"""Process knowledge transferred to a new object: regions found, tool paths planned or carried.
+"""Process knowledge transferred to a new object: regions found, tool paths planned or warped.
 
-A `ProcessTransfer` is knowledge on its reference, embedded once; `transfer` takes any number of
+A `ProcessTransfer` is knowledge on its reference, encoded once; `transfer` takes any number of
 targets.
 
     process = nrdf.load_process("chair.yaml")
@@ -15,17 +15,15 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
@@ -36,81 +34,38 @@ from nrdf.process.bound_knowledge import (
     read_bound_knowledge,
     unit_and_warnings,
 )
-from nrdf.process.correspondence import Correspondence, TaughtSurface
-from nrdf.process.knowledge import Process, TaughtSegment, TransferMode
+from nrdf.process.correspondence import Correspondence, ReferenceSurface
+from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.process.strategy import strategy_of, tool_path
-from nrdf.process.taught_paths import TaughtLine, taught_lines
-from nrdf.process.warp import carry
+from nrdf.process.taught_paths import contact_points, taught_segments
+from nrdf.process.transfer_result import (
+    MIN_CONFIDENCE,
+    FoundRegion,
+    PathResult,
+    TransferResult,
+    reason_to_skip,
+)
+from nrdf.process.warp import longest_step, warp_segments
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind import KindCheck
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
-from nrdf.toolpath.metrics import Measures, measure
-from nrdf.toolpath.planner import drive, plan
-from nrdf.toolpath.types import Segment, ToolPath
+from nrdf.toolpath.metrics import measure
+from nrdf.toolpath.planner import add_approach_retract, plan
+from nrdf.toolpath.types import Segment
 
 log = logging.getLogger(__name__)
 
-MIN_CONFIDENCE = 0.25
-"""A region found with less mean confidence is skipped (docs/scans.md)."""
-_LONGER = 2.0  # times the longest step on the reference, from which a carried one is said
+_LONGER = 2.0  # times the longest step on the reference, from which a warped one is reported
 _THREADS = 4  # that plan: numpy leaves them little to do at once
-
-
-@dataclass(frozen=True)
-class FoundRegion:
-    """A region on the target: its match; `missing` says why it is skipped, "" where it is not."""
-
-    name: str
-    match: Match
-    missing: str = ""
-
-
-@dataclass(frozen=True)
-class PathResult:
-    """One process on one region of the target.
-
-    number: which of the region's processes, from 0. process: as it is on the target (its
-    direction, or its warped waypoints, in the target's frame). path, measures: None where there is
-    no tool path; `reason` says why.
-    """
-
-    region: str
-    number: int
-    process: Process
-    transfer_mode: TransferMode
-    path: ToolPath | None = None
-    measures: Measures | None = None
-    warnings: tuple[str, ...] = ()
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class TransferResult:
-    """Everything on one target, in metres in its own frame; paths in the order they are driven.
-
-    target: with normals, estimated where its file had none. seconds: time by phase. pose: from
-    canonical coordinates to the target's: how the object lies there. target_warnings: about the
-    target's pose and unit. kind: what it looks like. All warnings that `--strict` refuses:
-    `nrdf.process.limits.strict_warnings`.
-    """
-
-    bound_knowledge: BoundKnowledge
-    target: PointCloud
-    regions: dict[str, FoundRegion]
-    paths: tuple[PathResult, ...]
-    warnings: tuple[str, ...]
-    seconds: dict[str, float]
-    pose: Similarity | None = None
-    target_warnings: tuple[str, ...] = ()
-    kind: KindCheck | None = None
 
 
 class ProcessTransfer:
     """Knowledge on its reference, as a model sees it.
 
-    Raises ModelError for a model of another category.
+    bound_knowledge: the knowledge with its reference's cloud and regions. reference: that cloud,
+    encoded. Raises ModelError for a model of another category.
     """
 
     def __init__(self, bound_knowledge: BoundKnowledge, model: Model) -> None:
@@ -121,10 +76,9 @@ class ProcessTransfer:
                 f"{category}; give a model for {category}"
             )
         self.bound_knowledge, self.model = bound_knowledge, model
-        self.taught = model.set_reference(bound_knowledge.cloud)
-        self.reference = TaughtSurface(self.taught)
-        self.surface = self.reference.surface
-        self._lines: dict[tuple[str, int], tuple[TaughtLine, ...]] = {}
+        self.reference = model.set_reference(bound_knowledge.cloud)
+        self.reference_surface = ReferenceSurface(self.reference)
+        self._segments: dict[tuple[str, int], tuple[Segment, ...]] = {}
 
     def transfer(
         self,
@@ -140,85 +94,60 @@ class ProcessTransfer:
         """Find the regions on a target, and bring every process there.
 
         target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in the
-        category's orientation, or embedded in any pose, in metres. unit: of the
-        target, where its file did not say. A region that is found nowhere, or with
-        less mean confidence than `min_confidence`, is skipped; a process that does not fit its
-        region there is left out with the reason. marked: regions that a person has marked on the
-        target, by name, as `region_indices` takes them, points in metres; they are taken as they
-        are, and a mask that is False everywhere says that the region is not there. `progress` is
-        told (done, all) steps. target_warnings: warnings about the target's pose and unit; unless
-        given, its unit is checked here, and warnings are logged. whole: the
-        target before it was thinned, in metres, by which tool paths are judged. kind: what the
-        target was found to look like; it is checked here unless given. Raises
-        CloudError for a target that cannot be used, ProcessError for one whose unit nothing tells,
-        RegionError for a marked region that is not taught or not on the target, ConfigError for a
-        `min_confidence` that is no share.
+        category's orientation, or an EncodedCloud in any pose, in metres. unit: of the target,
+        where its file did not say. min_confidence: a region that is found nowhere, or with less
+        mean confidence, is skipped; a process that does not fit its region there is left out with
+        the reason. marked: regions that a person has marked on the target, by name, as
+        `region_indices` takes them, points in metres; they are taken as they are, and a mask that
+        is False everywhere says that the region is not there. progress: is told (done, all) steps.
+        target_warnings: what is uncertain about the target's pose and unit; unless given, its unit
+        is checked here, and logged as a warning where it is uncertain. whole: the target before it
+        was thinned, in metres, which tool paths are compared with. kind: what the target was found
+        to look like; it is checked here unless given.
+
+        Raises CloudError for a target that cannot be used, ProcessError for one whose unit nothing
+        tells, RegionError for a marked region that is not taught or not on the target, ConfigError
+        for a `min_confidence` that is no share.
         """
         FRACTION.check("min_confidence", min_confidence)
         start = time.perf_counter()
-        unit_warnings: Sequence[str] = ()
-        if isinstance(target, EncodedCloud):
-            embedded = self.taught.facing(self.bound_knowledge.regions, target)
-        else:
-            target = as_cloud(target, "the target")
-            category = self.bound_knowledge.knowledge.category
-            known, unit_warnings = unit_and_warnings(target, unit, category, "the target", "unit")
-            embedded = self.model.encode(in_metres(target, known))
+        regions = self.bound_knowledge.regions
+        encoded, unit_warnings = self._encode(target, unit)
         if kind is None:
-            kind = self.taught.check_kind(embedded)
+            kind = self.reference.check_kind(encoded)
         if target_warnings is None:
             target_warnings = unit_warnings
             for warning in (*unit_warnings, *kind.warnings):
                 log.warning("%s", warning)
-        matches = self.taught.retrieve_all(self.bound_knowledge.regions, embedded, check=False)
-        matches |= self._marked(marked or {}, matches, embedded.cloud)
-        found = {n: FoundRegion(n, m, _missing(m, min_confidence)) for n, m in matches.items()}
+        matches = self.reference.retrieve_all(regions, encoded, check=False)
+        matches |= _marked_matches(marked or {}, matches, encoded.cloud)
+        found = {
+            n: FoundRegion(n, m, reason_to_skip(m, min_confidence)) for n, m in matches.items()
+        }
         seconds = {"regions": time.perf_counter() - start}
         start = time.perf_counter()
-        way = Correspondence(self.reference, embedded)
+        correspondence = Correspondence(self.reference_surface, encoded)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
-        way.target.edges  # noqa: B018, what all paths share
-        cloud = with_normals(embedded)
+        cloud = with_normals(encoded)
         given = given_surface(cloud if whole is None else with_normals_of(whole, cloud))
-        steps, paths = self.steps(), []
-        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
-            planned = [pool.submit(self._path, *step, found[step[0]], way, given) for step in steps]
-            try:
-                for done, path in enumerate(planned):
-                    if progress is not None:
-                        progress(done + 1, len(steps) + 1)
-                    paths.append(path.result())
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        paths = self._paths(found, correspondence, given, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
-        warnings = (*skipped, *(line.split(";")[0] for line in shared))
-        made, pose, about_target = tuple(paths), embedded.pose, tuple(target_warnings)
         return TransferResult(
-            self.bound_knowledge, cloud, found, made, warnings, seconds, pose, about_target, kind
+            bound_knowledge=self.bound_knowledge,
+            target=cloud,
+            regions=found,
+            paths=paths,
+            warnings=(*skipped, *(line.split(";")[0] for line in shared)),
+            seconds=seconds,
+            pose=encoded.pose,
+            target_warnings=tuple(target_warnings),
+            kind=kind,
         )
-
-    def _marked(
-        self, marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
-    ) -> dict[str, Match]:
-        """Matches of regions that a person has marked on the target, with confidence 1."""
-        matches = {}
-        for name, region in marked.items():
-            if name not in found:
-                raise RegionError(unknown_name("taught region", name, list(found)))
-            values = np.asarray(region)
-            try:
-                absent = values.dtype == bool and len(values) == len(target) and not values.any()
-                indices = np.arange(0) if absent else np.unique(region_indices(values, target))
-            except RegionError as error:
-                raise RegionError(f"region '{name}' on the target: {error}") from None
-            matches[name] = Match(indices, found[name].points, np.ones(len(indices)), "marked")
-        return matches
 
     def steps(self) -> list[tuple[str, int, Process]]:
         """Every process with its region and number there, in the order in which they are done."""
@@ -229,32 +158,62 @@ class ProcessTransfer:
         ]
         return sorted(steps, key=lambda step: step[2].order)
 
-    def lines(self, region: str, number: int) -> tuple[TaughtLine, ...]:
-        """The lines on the reference of a process: as taught, or planned there."""
-        if (region, number) not in self._lines:
-            process = self._process(region, number)
+    def reference_segments(self, region: str, number: int) -> tuple[Segment, ...]:
+        """The process segments of a process on the reference: as taught, or planned there."""
+        if (region, number) not in self._segments:
+            process, surface = self._process(region, number), self.reference_surface.surface
             if process.waypoints is not None:
-                lines = taught_lines(process, self.surface)
+                segments = taught_segments(process, surface)
             else:
-                inside = working(self.taught.reference, self.bound_knowledge.regions[region])
+                inside = working(self.reference.reference, self.bound_knowledge.regions[region])
                 once = replace(strategy_of(process), passes=1)
-                segments = plan(self.surface, inside, once)
-                lines = tuple(
-                    TaughtLine(s.positions, s.quaternions_xyzw) for s in segments
-                    if s.kind == "process"
-                )  # fmt: skip
-            self._lines[region, number] = lines
-        return self._lines[region, number]
+                segments = tuple(s for s in plan(surface, inside, once) if s.kind == "process")
+            self._segments[region, number] = segments
+        return self._segments[region, number]
 
-    def contacts(self, region: str, number: int) -> list[np.ndarray]:
-        """The places (n, 3) on the reference's surface that each line of a process works."""
+    def reference_contacts(self, region: str, number: int) -> list[np.ndarray]:
+        """The points (n, 3) of the reference's surface that each segment of a process works."""
         height = self._process(region, number).standoff_m
-        lines = self.lines(region, number)
-        return [touched(line.positions, line.quaternions_xyzw, height) for line in lines]
+        segments = self.reference_segments(region, number)
+        return [contact_points(s.positions, s.quaternions_xyzw, height) for s in segments]
+
+    def _encode(self, target: Any, unit: str | None) -> tuple[EncodedCloud, Sequence[str]]:
+        """The target encoded, in metres, and what is uncertain about its unit."""
+        if isinstance(target, EncodedCloud):
+            return self.reference.facing(self.bound_knowledge.regions, target), ()
+        target = as_cloud(target, "the target")
+        category = self.bound_knowledge.knowledge.category
+        known, warnings = unit_and_warnings(target, unit, category, "the target", "unit")
+        return self.model.encode(in_metres(target, known)), warnings
 
     def _process(self, region: str, number: int) -> Process:
         named = {r.name: r for r in self.bound_knowledge.knowledge.regions}
         return named[region].processes[number]
+
+    def _paths(
+        self,
+        found: Mapping[str, FoundRegion],
+        correspondence: Correspondence,
+        given: GivenSurface,
+        progress: Callable[[int, int], None] | None,
+    ) -> tuple[PathResult, ...]:
+        """Every process on the target, planned by several threads."""
+        correspondence.target_surface.edges  # noqa: B018, what all paths share
+        steps, paths = self.steps(), []
+        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+            planned = [
+                pool.submit(self._path, *step, found[step[0]], correspondence, given)
+                for step in steps
+            ]
+            try:
+                for done, path in enumerate(planned):
+                    if progress is not None:
+                        progress(done + 1, len(steps) + 1)
+                    paths.append(path.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+        return tuple(paths)
 
     def _path(
         self,
@@ -262,51 +221,55 @@ class ProcessTransfer:
         number: int,
         process: Process,
         found: FoundRegion,
-        way: Correspondence,
+        correspondence: Correspondence,
         given: GivenSurface,
     ) -> PathResult:
+        """One process on one region of the target."""
         made = PathResult(region, number, process, process.transfer_mode)
         if found.missing:
             return replace(made, reason=found.missing)
-        inside = working(way.embedded, found.match.indices)
+        surface = correspondence.target_surface
+        inside = working(correspondence.target, found.match.indices)
         if process.direction is not None:
-            direction = way.direction(
-                self.bound_knowledge.regions[region], np.array(process.direction)
-            )
+            indices = self.bound_knowledge.regions[region]
+            direction = correspondence.map_direction(indices, np.array(process.direction))
             process = process.model_copy(update={"direction": tuple(direction.tolist())})
         strategy = strategy_of(process)
         warnings: tuple[str, ...] = ()
         try:
             if process.transfer_mode == "replan":
-                segments = plan(way.target, inside, strategy)
+                segments = plan(surface, inside, strategy)
             else:
-                process, segments, warnings = self._carry(region, number, process, way)
-            figures = measure(way.target, inside, strategy, segments, given)
+                process, segments, warnings = self._warp(region, number, process, correspondence)
+            measures = measure(surface, inside, strategy, segments, given)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)
-        return replace(made, process=process, path=path, measures=figures, warnings=warnings)
+        return replace(made, process=process, path=path, measures=measures, warnings=warnings)
 
-    def _carry(
-        self, region: str, number: int, process: Process, way: Correspondence
+    def _warp(
+        self, region: str, number: int, process: Process, correspondence: Correspondence
     ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
-        lines = self.lines(region, number)
-        carried, lost = carry(way, lines, process.tool.radius_m)
-        total = sum(len(line.positions) for line in lines)
-        if not carried:
+        """A process with its waypoints warped to the target, its segments there, and warnings."""
+        here = self.reference_segments(region, number)
+        there, lost = warp_segments(correspondence, here, process.tool.radius_m)
+        total = sum(len(segment.positions) for segment in here)
+        if not there:
             raise ProcessError(f"none of the {total} waypoints has a place on the target")
         warnings = [f"{lost} of {total} waypoints have no place on the target"] if lost else []
-        here, there = (max(longest_step(line.positions) for line in of) for of in (lines, carried))
-        if there > _LONGER * here:
+        longest, warped = (max(longest_step(s.positions) for s in of) for of in (here, there))
+        if warped > _LONGER * longest:
             warnings.append(
-                f"a step of {in_words('_m', there)} between neighbouring waypoints; the longest "
-                f"on the reference is {in_words('_m', here)}"
+                f"a step of {in_words('_m', warped)} between neighbouring waypoints; the longest "
+                f"on the reference is {in_words('_m', longest)}"
             )
-        drawn = [(line.positions, line.quaternions_xyzw) for line in carried]
-        normals = [line.normals for line in carried]
-        segments = drive(drawn, normals, strategy_of(process))
+        normals = [segment.normals for segment in there]
+        segments = add_approach_retract(there, normals, strategy_of(process))
         waypoints = [
-            TaughtSegment(positions_m=p.tolist(), quaternions_xyzw=q.tolist()) for p, q in drawn
+            TaughtSegment(
+                positions_m=s.positions.tolist(), quaternions_xyzw=s.quaternions_xyzw.tolist()
+            )
+            for s in there
         ]
         changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
         return process.model_copy(update=changes), segments, tuple(warnings)
@@ -324,39 +287,34 @@ def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTr
     return ProcessTransfer(bound_knowledge, load_model(category) if model is None else model)
 
 
-def touched(positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float) -> np.ndarray:
-    """The places (n, 3) that tools at positions (n, 3), some height over a surface, point at."""
-    along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
-    return np.asarray(positions + standoff_m * along)
+def _marked_matches(
+    marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
+) -> dict[str, Match]:
+    """Matches of regions that a person has marked on the target: they are certain."""
+    matches = {}
+    for name, region in marked.items():
+        if name not in found:
+            raise RegionError(unknown_name("taught region", name, list(found)))
+        values = np.asarray(region)
+        try:
+            absent = values.dtype == bool and len(values) == len(target) and not values.any()
+            indices = np.arange(0) if absent else np.unique(region_indices(values, target))
+        except RegionError as error:
+            raise RegionError(f"region '{name}' on the target: {error}") from None
+        matches[name] = Match(indices, found[name].points, np.ones(len(indices)), "marked")
+    return matches
 
 
-def longest_step(positions: np.ndarray) -> float:
-    """The longest way between neighbours of positions (n, 3)."""
-    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max(initial=0.0))
+def with_normals(encoded: EncodedCloud) -> PointCloud:
+    """The whole cloud of an encoded one, with the normals that the field works with."""
+    if encoded.cloud.normals is not None:
+        return encoded.cloud
+    normals = encoded.original_normals(encoded.normals)
+    return replace(encoded.cloud, normals=normals[encoded.nearest_working])
 
 
-def with_normals(embedded: EncodedCloud) -> PointCloud:
-    """The whole cloud with the normals that the field works with."""
-    if embedded.cloud.normals is not None:
-        return embedded.cloud
-    normals = embedded.original_normals(embedded.normals)
-    return replace(embedded.cloud, normals=normals[embedded.nearest_working])
-
-
-def working(embedded: EncodedCloud, indices: np.ndarray) -> np.ndarray:
-    """Indices of a cloud's points as indices of the points that the field works on."""
-    inside = np.zeros(len(embedded.cloud), bool)
+def working(encoded: EncodedCloud, indices: np.ndarray) -> np.ndarray:
+    """Indices of a whole cloud's points as indices of the points that the field works on."""
+    inside = np.zeros(len(encoded.cloud), bool)
     inside[indices] = True
-    return np.flatnonzero(inside[embedded.working])
-
-
-def _missing(match: Match, min_confidence: float) -> str:
-    if match.presence.reason:
-        return f"{match.presence.reason} (confidence {match.presence.confidence:.2f})"
-    if not len(match.indices) and match.method == "marked":
-        return "marked as not there"
-    if not len(match.indices):
-        return "found nowhere on the target"
-    if match.score < min_confidence:
-        return f"confidence {match.score:.2f}, below {min_confidence:g}"
-    return ""
+    return np.flatnonzero(inside[encoded.working])

@@ -1,7 +1,7 @@
-"""EncodedReference waypoints carried to another object.
+"""Waypoints warped from the reference to another object.
 
-Each waypoint's foot on the reference's surface goes through the correspondence, and the tool keeps
-its place and angles relative to the local frame of travel and normal.
+The point of the reference's surface under each waypoint goes through the correspondence. The tool
+keeps its height and its angles relative to the local frame of travel and normal.
 """
 
 from __future__ import annotations
@@ -13,70 +13,87 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.process.correspondence import Correspondence, lengths
-from nrdf.process.taught_paths import TaughtLine, feet_under
+from nrdf.process.taught_paths import surface_under
 from nrdf.toolpath.frames import surface_frames, travel_of
+from nrdf.toolpath.types import Segment
 
 _TORN, _GAP = 1.5, 1.2  # times its length on the reference, and spacings, that a step may have
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
 
 
-@dataclass(frozen=True)
-class CarriedLine(TaughtLine):
-    """A line on the target. normals: (n, 3) of the surface under it; taught: number of the taught
-    line; waypoints: (n,) which of its waypoints these are."""
+@dataclass(frozen=True, kw_only=True)
+class WarpedSegment(Segment):
+    """A process segment on the target. line: the number of the given segment that it comes from.
+    normals: (n, 3) of the surface under it; source: (n,) which of that segment's waypoints
+    these are."""
 
     normals: np.ndarray
-    taught: int
-    waypoints: np.ndarray
+    source: np.ndarray
 
 
-def carry(
-    way: Correspondence, lines: Sequence[TaughtLine], tool_radius_m: float
-) -> tuple[tuple[CarriedLine, ...], int]:
-    """Lines on the reference as lines on the target, and how many waypoints have no place.
+def warp_segments(
+    correspondence: Correspondence, segments: Sequence[Segment], tool_radius_m: float
+) -> tuple[tuple[WarpedSegment, ...], int]:
+    """Process segments on the reference as segments on the target, and how many waypoints have no
+    counterpart there.
 
-    A line is cut where waypoints have no counterpart, and where the surface is torn between
-    two of them, so that no tool is driven across a gap. The tool's height over the surface, and
-    its angles to travel and normal, stay; a flat tool of `tool_radius_m` feels the normals.
+    A segment is cut where waypoints have no counterpart, and where the surface is torn between two
+    of them, so that no tool crosses a gap. The tool's height over the surface, and its angles to
+    travel and normal, stay; normals are smoothed over a flat tool of `tool_radius_m`.
     """
-    if not lines:
+    if not segments:
         return (), 0
-    source = way.reference.surface
-    positions = np.concatenate([line.positions for line in lines])
-    quaternions = np.concatenate([line.quaternions_xyzw for line in lines])
-    owner = np.repeat(np.arange(len(lines)), [len(line.positions) for line in lines])
-    turns = Rotation.from_quat(quaternions).as_matrix()
-    feet, normals = feet_under(source, positions, -turns[:, :, 2])
-    felt = source.smooth_normals(feet, normals, tool_radius_m)
-    found, found_normals, exists = way.places(feet, normals)
-    found_felt = way.target.smooth_normals(found, found_normals, tool_radius_m)
-    # Where there is no line to tell the travel, a short way along tool x is mapped.
-    ahead, ahead_normals = source.project(feet + 2 * source.spacing * turns[:, :, 0], normals)
-    step = way.places(ahead, ahead_normals)[0] - found
-    grown = way.embedded.pose.scale / way.reference.taught.reference.pose.scale
-    carried, lost = [], int((~exists).sum())
-    for number in range(len(lines)):
-        mine = np.flatnonzero(owner == number)
-        step_there = lengths(np.diff(found[mine], axis=0))
-        step_here = lengths(np.diff(feet[mine], axis=0))
-        torn = step_there > _TORN * grown * step_here + _GAP * way.target.spacing
-        for run in _runs(exists[mine], torn):
-            at = mine[run]
-            frames = _frames(feet[at], felt[at], turns[at, :, 0], source.spacing)
-            there = _frames(found[at], found_felt[at], step[at], way.target.spacing)
-            change = there @ frames.transpose(0, 2, 1)
-            offset = np.einsum("mab,mb->ma", change, positions[at] - feet[at])
-            turned = Rotation.from_matrix(change @ turns[at]).as_quat()
-            line = CarriedLine(found[at] + offset, turned, found_felt[at], number, run)
-            carried.append(line)
-    return tuple(carried), lost
+    source = correspondence.reference.surface
+    target = correspondence.target_surface
+    positions = np.concatenate([segment.positions for segment in segments])
+    quaternions = np.concatenate([segment.quaternions_xyzw for segment in segments])
+    owner = np.repeat(np.arange(len(segments)), [len(s.positions) for s in segments])
+    rotations = Rotation.from_quat(quaternions).as_matrix()
+    under, normals = surface_under(source, positions, -rotations[:, :, 2])
+    smooth = source.smooth_normals(under, normals, tool_radius_m)
+    found, found_normals, exists = correspondence.map_points(under, normals)
+    found_smooth = target.smooth_normals(found, found_normals, tool_radius_m)
+    # A waypoint alone has no travel: a short step along tool x is mapped instead.
+    ahead, ahead_normals = source.project(under + 2 * source.spacing * rotations[:, :, 0], normals)
+    step = correspondence.map_points(ahead, ahead_normals)[0] - found
+    warped, lost = [], int((~exists).sum())
+    for number, segment in enumerate(segments):
+        own = np.flatnonzero(owner == number)
+        step_there = lengths(np.diff(found[own], axis=0))
+        step_here = lengths(np.diff(under[own], axis=0))
+        torn = step_there > _TORN * correspondence.scale * step_here + _GAP * target.spacing
+        for run in _runs(exists[own], torn):
+            at = own[run]
+            here = _frames(under[at], smooth[at], rotations[at, :, 0], source.spacing)
+            there = _frames(found[at], found_smooth[at], step[at], target.spacing)
+            change = there @ here.transpose(0, 2, 1)
+            offset = np.einsum("mab,mb->ma", change, positions[at] - under[at])
+            warped.append(
+                WarpedSegment(
+                    kind="process",
+                    line=number,
+                    positions=found[at] + offset,
+                    quaternions_xyzw=Rotation.from_matrix(change @ rotations[at]).as_quat(),
+                    feed_m_s=segment.feed_m_s,
+                    force_n=segment.force_n,
+                    dwell_s=segment.dwell_s,
+                    normals=found_smooth[at],
+                    source=run,
+                )
+            )
+    return tuple(warped), lost
+
+
+def longest_step(positions: np.ndarray) -> float:
+    """The longest distance between neighbours of positions (n, 3)."""
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max(initial=0.0))
 
 
 def _frames(
     points: np.ndarray, normals: np.ndarray, alone: np.ndarray, spacing: float
 ) -> np.ndarray:
-    """Frames (n, 3, 3) of travel and normal along a line; `alone` (n, 3) is the travel of one
-    that stands still."""
+    """Frames (n, 3, 3) of travel and normal along a line; `alone` (n, 3) is the travel where the
+    line does not move."""
     moves = len(points) > 1 and float(np.ptp(points, axis=0).max()) > 0.5 * spacing
     travel = travel_of(points, _SMOOTH * spacing) if moves else alone
     return surface_frames(travel, normals)

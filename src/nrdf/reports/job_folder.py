@@ -19,7 +19,8 @@ from nrdf.process.bound_knowledge import checksum, overlaps
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
-from nrdf.process.transfer import TransferResult, touched
+from nrdf.process.taught_paths import contact_points
+from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
 from nrdf.reports.page import write_page
 from nrdf.reports.transfer_report import report_of
@@ -103,7 +104,7 @@ def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
         if step.path is not None:
             work = [s for s in step.path.segments if s.kind == "process"]
             height = step.process.standoff_m
-            drawn = [touched(s.positions, s.quaternions_xyzw, height) for s in work]
+            drawn = [contact_points(s.positions, s.quaternions_xyzw, height) for s in work]
             lines.setdefault(step.region, []).extend(line @ turn for line in drawn)
     target = result.target
     normals = None if target.normals is None else target.normals @ turn

@@ -10,7 +10,7 @@ import numpy as np
 from nrdf.process.knowledge import Process
 from nrdf.process.limits import Limits, strict_warnings
 from nrdf.process.path_warnings import measure_warnings
-from nrdf.process.transfer import PathResult, TransferResult
+from nrdf.process.transfer_result import PathResult, TransferResult
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.metrics import REASONS
 

@@ -61,27 +61,28 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
         surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
     )
     contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
-    return drive(_held(contacts, normals, strategy), normals, strategy)
+    return add_approach_retract(_tool_segments(contacts, normals, strategy), normals, strategy)
 
 
-def drive(
-    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+def add_approach_retract(
+    lines: Sequence[Segment],
     normals: Sequence[np.ndarray],
     strategy: Strategy,
 ) -> tuple[Segment, ...]:
-    """Segments that drive given lines, in that order, with approach and retract.
+    """Process segments in the given order, each with its approach and retract, for all passes.
 
-    lines: positions (n, 3), m, of the tool centre point, and quaternions_xyzw (n, 4), for each;
-    normals: (n, 3), outward, of the surface under each. Every second pass drives the lines
-    backwards, the tool turned half around the normal. Raises ProcessError for too many of them.
+    lines: process segments; feed, force and dwell are the strategy's. normals: (n, 3), outward, of
+    the surface under the waypoints of each. Every second pass goes backwards, the tool turned half
+    around the normal. Raises ProcessError for too many of them.
     """
-    check_passes(sum(len(line[0]) for line in lines), len(lines), strategy.passes)
+    check_passes(sum(len(line.positions) for line in lines), len(lines), strategy.passes)
     segments: list[Segment] = []
     number = 0
     for index in range(strategy.passes):
         order = range(len(lines)) if index % 2 == 0 else range(len(lines) - 1, -1, -1)
         for k in order:
-            (positions, quaternions), outward = lines[k], normals[k]
+            positions, quaternions = lines[k].positions, lines[k].quaternions_xyzw
+            outward = normals[k]
             if index % 2:
                 positions, outward = positions[::-1], outward[::-1]
                 half = Rotation.from_rotvec(np.pi * outward)
@@ -91,17 +92,22 @@ def drive(
     return tuple(segments)
 
 
-def _held(
+def _tool_segments(
     contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Positions and quaternions of a tool along lines on the surface."""
+) -> list[Segment]:
+    """Process segments of a tool along lines on the surface."""
     travel = np.concatenate([travel_of(line, 0.5 * strategy.stepover_m) for line in contacts])
     upright = surface_frames(travel, np.concatenate(normals))
     turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
     places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
     quaternions = [steady(part) for part in np.split(turned.as_quat(), cuts)]
-    return list(zip(np.split(places, cuts), quaternions, strict=True))
+    return [
+        Segment("process", number, positions, held, strategy.feed_m_s, strategy.force_n)
+        for number, (positions, held) in enumerate(
+            zip(np.split(places, cuts), quaternions, strict=True)
+        )
+    ]
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:

@@ -31,7 +31,7 @@ def warp(
     import numpy as np
 
     import nrdf
-    from nrdf.process.transfer import MIN_CONFIDENCE
+    from nrdf.process.transfer_result import MIN_CONFIDENCE
     from nrdf_benchmark.warp import evaluate_warp
 
     loaded = nrdf.load_model(model or category, device)

@@ -19,7 +19,9 @@ from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.check import CheckedProcess, check_process
-from nrdf.process.transfer import ProcessTransfer, TransferResult, touched
+from nrdf.process.taught_paths import contact_points
+from nrdf.process.transfer import ProcessTransfer
+from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
 from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
 from nrdf.studio.model.paintable_cloud import PaintableCloud
@@ -53,7 +55,7 @@ class Plan:
             return []
         height = self.checked.process.standoff_m
         return [
-            touched(s.positions, s.quaternions_xyzw, height)
+            contact_points(s.positions, s.quaternions_xyzw, height)
             for s in self.checked.segments
             if s.kind == "process"
         ]
@@ -156,7 +158,7 @@ class LocalComputing:
         self, reference: str, files: Mapping[str, str], progress: Progress
     ) -> CorrespondenceFeatures:
         """What the descriptors of objects, by key and file, say of what was taught last."""
-        taught = self._taught.taught
+        taught = self._taught.reference
         said = {}
         for done, (key, file) in enumerate(files.items()):
             progress(done, len(files))

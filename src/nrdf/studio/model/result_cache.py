@@ -10,7 +10,7 @@ import numpy as np
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.io.cloud import PointCloud
 from nrdf.process.limits import LOW_CONFIDENCE
-from nrdf.process.transfer import TransferResult
+from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
     CorrespondenceFeatures,
