@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.geometry.frames import z_axes
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.correspondence import Correspondence
@@ -170,4 +170,4 @@ def _warped(
 
 
 def _tool_z(quaternions_xyzw: np.ndarray) -> np.ndarray:
-    return np.asarray(Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2])
+    return z_axes(quaternions_xyzw)

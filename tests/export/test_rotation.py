@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.export.rotation import (
     kuka_abc_deg,
-    quaternions_wxyz,
     rotary_angles_deg,
     rotation_vectors,
     tool_axes,
     tool_z_out,
 )
+from nrdf.geometry.frames import xyzw_to_wxyz
 
 
 def about(axis, degrees):
@@ -96,11 +96,11 @@ def test_kuka_abc_even_in_gimbal_lock_and_without_a_warning():
 
 
 def test_quaternions_wxyz():
-    ours = quaternions_wxyz(POSES)
+    ours = xyzw_to_wxyz(POSES)
     np.testing.assert_array_equal(ours[:, 0], POSES[:, 3])
     again = Rotation.from_quat(ours[:, [1, 2, 3, 0]])
     np.testing.assert_allclose((again * Rotation.from_quat(POSES).inv()).magnitude(), 0, atol=1e-7)
-    np.testing.assert_array_equal(quaternions_wxyz(np.array([[1, 2, 3, 4]])), [[4, 1, 2, 3]])
+    np.testing.assert_array_equal(xyzw_to_wxyz(np.array([[1, 2, 3, 4]])), [[4, 1, 2, 3]])
 
 
 def test_tool_z_out_turns_about_tool_x():

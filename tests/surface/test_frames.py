@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from nrdf.surface.surface import unit
-from nrdf.toolpath.frames import (
-    lean_rotation,
-    steady,
-    surface_frames,
-    tool_quaternions,
-    travel_of,
-)
+from nrdf.geometry.frames import unit_vectors, without_sign_jumps
+from nrdf.toolpath.frames import lean_rotation, surface_frames, tool_quaternions, travel_of
 
 FORWARD, UP, RIGHT = np.eye(3)[0], np.eye(3)[2], -np.eye(3)[1]
 
@@ -21,7 +15,7 @@ FORWARD, UP, RIGHT = np.eye(3)[0], np.eye(3)[2], -np.eye(3)[1]
 def test_frames_are_right_handed_with_z_into_the_part_and_x_along_the_travel():
     rng = np.random.default_rng(0)
     travel, normals = rng.normal(size=(2, 200, 3))
-    normals = unit(normals)
+    normals = unit_vectors(normals)
     frames = surface_frames(travel, normals)
     np.testing.assert_allclose(frames.transpose(0, 2, 1) @ frames, [np.eye(3)] * 200, atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(frames), 1.0)
@@ -59,13 +53,15 @@ def test_quaternions_do_not_change_sign_along_a_circle():
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0)
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.1
     flipped = quaternions * np.where(np.arange(100) % 3 == 0, -1.0, 1.0)[:, None]
-    assert np.abs(np.diff(steady(flipped), axis=0)).max() < 0.1
+    assert np.abs(np.diff(without_sign_jumps(flipped), axis=0)).max() < 0.1
 
 
 def test_travel_is_central_and_smoothed_over_corners():
     corner = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0.0]])
-    np.testing.assert_allclose(travel_of(corner)[[0, 2, 4]], [FORWARD, unit([1, 1, 0]), -RIGHT])
-    np.testing.assert_allclose(travel_of(corner, 1.0)[1], unit(np.array([2, 1, 0])))
+    np.testing.assert_allclose(
+        travel_of(corner)[[0, 2, 4]], [FORWARD, unit_vectors([1, 1, 0]), -RIGHT]
+    )
+    np.testing.assert_allclose(travel_of(corner, 1.0)[1], unit_vectors(np.array([2, 1, 0])))
 
 
 def test_the_travel_of_a_closed_line_goes_on_over_its_ends():

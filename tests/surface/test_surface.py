@@ -7,7 +7,8 @@ import pytest
 
 from builders.surfaces import SPACING, board, dome, slats, two_sided
 from nrdf.errors import ProcessError
-from nrdf.surface.surface import MOST_POINTS, Surface, quadrics, tangent_frames, unit
+from nrdf.geometry.frames import unit_vectors
+from nrdf.surface.surface import MOST_POINTS, Surface, quadrics
 
 
 def test_the_spacing_of_random_points_is_that_of_their_density():
@@ -51,9 +52,9 @@ def test_points_are_brought_onto_a_sphere_and_their_normals_with_them():
     surface = Surface(points, normals)
     inner = points[normals[:, 2] > np.cos(0.8)][:300]
     off = inner * np.random.default_rng(0).uniform(0.98, 1.02, (len(inner), 1))
-    found, outward = surface.project(off, unit(inner))
+    found, outward = surface.project(off, unit_vectors(inner))
     assert np.abs(np.linalg.norm(found, axis=1) - 0.25).max() < 2e-4
-    assert (np.einsum("na,na->n", outward, unit(inner)) > np.cos(np.radians(2))).all()
+    assert (np.einsum("na,na->n", outward, unit_vectors(inner)) > np.cos(np.radians(2))).all()
 
 
 def test_noise_is_smoothed():
@@ -109,14 +110,6 @@ def test_a_quadric_is_fitted_exactly():
     values = 3 + 2 * x - y + 0.5 * x**2 - x * y + y**2
     found = quadrics(offset, values[..., None], np.ones((5, 30)))[..., 0]
     np.testing.assert_allclose(found, np.tile([3, 2, -1, 1, -1, 2], (5, 1)), atol=0.03)
-
-
-def test_tangent_frames_are_right_handed():
-    normals = unit(np.random.default_rng(0).normal(size=(100, 3)))
-    frames = tangent_frames(normals)
-    np.testing.assert_allclose(np.linalg.det(frames), 1.0, atol=1e-12)
-    np.testing.assert_allclose(frames @ frames.transpose(0, 2, 1), [np.eye(3)] * 100, atol=1e-12)
-    np.testing.assert_array_equal(frames[:, 2], normals)
 
 
 def test_a_large_cloud_is_thinned_and_regions_follow():

@@ -15,7 +15,7 @@ from nrdf.export.header import (
 from nrdf.export.names import identifier, identifiers, number, numbers, program_name, routine_names
 from nrdf.export.options import Options
 from nrdf.export.prepare import Stroke, prepare, strokes
-from nrdf.export.rotation import quaternions_wxyz
+from nrdf.geometry.frames import xyzw_to_wxyz
 from nrdf.toolpath.types import Job, ToolPath
 
 _WORDS = (
@@ -85,7 +85,7 @@ def _path(path: ToolPath, options: Options, speeds: dict[float, str], how: str) 
 
 def _targets(stroke: Stroke) -> list[tuple[str, str]]:
     """Robtarget and zone of each waypoint."""
-    turns = quaternions_wxyz(stroke.quaternions_xyzw)
+    turns = xyzw_to_wxyz(stroke.quaternions_xyzw)
     made = []
     for position, turn, blend in zip(1000 * stroke.positions, turns, stroke.blends_m, strict=True):
         values = f"[{','.join(numbers(position, 5))}],[{','.join(numbers(turn, 9))}]"

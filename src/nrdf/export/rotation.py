@@ -12,6 +12,8 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import z_axes
+
 _POLE = 1e-9
 
 
@@ -19,11 +21,6 @@ def tool_z_out(quaternions_xyzw: np.ndarray) -> np.ndarray:
     """The same tools (n, 4) with z out of the part: turned by 180 degrees about tool x."""
     x, y, z, w = np.asarray(quaternions_xyzw, dtype=np.float64).T
     return np.stack([w, z, -y, -x], axis=1)
-
-
-def quaternions_wxyz(quaternions_xyzw: np.ndarray) -> np.ndarray:
-    """Quaternions (n, 4) in the order of ABB's orient: q1 q2 q3 q4 = w x y z."""
-    return np.asarray(quaternions_xyzw)[:, [3, 0, 1, 2]]
 
 
 def rotation_vectors(quaternions_xyzw: np.ndarray) -> np.ndarray:
@@ -43,7 +40,7 @@ def kuka_abc_deg(quaternions_xyzw: np.ndarray) -> np.ndarray:
 
 def tool_axes(quaternions_xyzw: np.ndarray) -> np.ndarray:
     """Unit vectors (n, 3) from the tool's tip to its holder, out of the part: APT's i j k."""
-    return -Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
+    return -z_axes(quaternions_xyzw)
 
 
 def rotary_angles_deg(

@@ -10,13 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Mapped
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
-from nrdf.surface.surface import SAME_SIDE, Surface, unit
+from nrdf.surface.surface import SAME_SIDE, Surface
 
 FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
 """A waypoint has a counterpart where C trusts the point that it gives, and where that point is at
@@ -104,7 +105,9 @@ class Correspondence:
         )
         return one._replace(
             points=0.5 * (one.points + LEFT_FOR_RIGHT * other.points),
-            normals=unit(unit(one.normals) + LEFT_FOR_RIGHT * unit(other.normals)),
+            normals=unit_vectors(
+                unit_vectors(one.normals) + LEFT_FOR_RIGHT * unit_vectors(other.normals)
+            ),
             existence=0.5 * (one.existence + other.existence),
             error=0.5 * (one.error + other.error),
         )
@@ -162,7 +165,9 @@ class Correspondence:
         distance, near = target.tree.query(start + sideways, near)
         alike = np.einsum("mka,ma->mk", target.normals[near], outward) > SAME_SIDE
         alike &= distance < 2.0 * target.spacing
-        ahead = np.einsum("mka,ma->mk", target.points[near] - start[:, None], unit(sideways))
+        ahead = np.einsum(
+            "mka,ma->mk", target.points[near] - start[:, None], unit_vectors(sideways)
+        )
         reach = np.where(alike, ahead, 0.0).max(axis=1)
         return np.maximum(length - np.maximum(reach, 0.0), 0.0)
 
@@ -180,12 +185,12 @@ class Correspondence:
         size = float(np.trace(spread))
         if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
             canonical = encoded.reference.canonical_normals(np.asarray(direction, float))
-            return unit(self.target.original_normals(canonical))
+            return unit_vectors(self.target.original_normals(canonical))
         turn, _ = Rotation.align_vectors(there, here)
         similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
         ridge = 0.05 * size / 3.0 * np.eye(3)
         affine = np.linalg.solve(spread + ridge, here.T @ there + ridge @ similar.T).T
-        return unit(affine @ unit(np.asarray(direction, float)))
+        return unit_vectors(affine @ unit_vectors(np.asarray(direction, float)))
 
 
 def surface_of(encoded: EncodedCloud) -> Surface:

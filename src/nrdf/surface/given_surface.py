@@ -14,9 +14,10 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.frames import tangent_frames, unit_vectors
 from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
-from nrdf.surface.surface import quadrics, tangent_frames, unit
+from nrdf.surface.surface import quadrics
 
 _NEIGHBOURS, _LEAST = 24, 6  # points that tell the surface between them
 _FACING, _ALIKE = 0.2, 0.7  # cosines: to the tool's axis; between normals of one sheet
@@ -149,7 +150,7 @@ class PointSurface:
         nearest = np.where(facing.any(axis=1), away[row, first], away[:, 0])
         offset = self._points[near] - places[:, None]
         # Along the sheet's own normal; the fit's slope is small, and so left out.
-        outward = unit(np.einsum("mk,mka->ma", weight, self._normals[near]))
+        outward = unit_vectors(np.einsum("mk,mka->ma", weight, self._normals[near]))
         known = np.abs(outward).max(axis=1, keepdims=True) > 0.0
         frame = tangent_frames(np.where(known, outward, own))
         turned = offset @ frame.transpose(0, 2, 1)

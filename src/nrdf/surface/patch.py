@@ -13,8 +13,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.frames import unit_vectors
 from nrdf.surface.border import CONTEXT, OTHER, OWN, Border
-from nrdf.surface.surface import Surface, quadrics, typical_spacing, unit
+from nrdf.surface.surface import Surface, quadrics, typical_spacing
 from nrdf.surface.unroll import Unrolled, unroll
 
 log = logging.getLogger(__name__)
@@ -82,7 +83,7 @@ class Patch:
         count = int(np.clip(1.5 * np.pi * (radius / self.spacing) ** 2, 16, 256))
         distance, near = self._tree.query(uv, min(count, len(self.uv)))
         weight = np.maximum(1.0 - (distance / radius) ** 2, 1e-6) ** 2
-        return unit(np.einsum("mk,mka->ma", weight, self.normals[near]))
+        return unit_vectors(np.einsum("mk,mka->ma", weight, self.normals[near]))
 
     @cached_property
     def metric(self) -> np.ndarray:
@@ -256,7 +257,10 @@ def _halves(surface: Surface, own: np.ndarray) -> list[np.ndarray]:
     else:
         for _ in range(10):
             side = normals @ (one - other) > 0.0
-            one, other = unit(normals[side].mean(axis=0)), unit(normals[~side].mean(axis=0))
+            one, other = (
+                unit_vectors(normals[side].mean(axis=0)),
+                unit_vectors(normals[~side].mean(axis=0)),
+            )
         for _ in range(4):  # the seam follows neighbourhoods, not single points
             vote = 2.0 * side - 1.0
             side = vote + np.bincount(i, vote[j], len(own)) > 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.frames import tangent_frames, unit_vectors
 from nrdf.geometry.sampling import downsample
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Surface:
         kept = _distinct(points, normals)
         self.kept = kept[downsample(points[kept], MOST_POINTS, np.random.default_rng(0))]
         self.points = points[self.kept]
-        self.normals = unit(normals[self.kept])
+        self.normals = unit_vectors(normals[self.kept])
         self.patches: dict[bytes, tuple[Patch, ...]] = {}
         self.blocked: dict[float, np.ndarray] = {}
 
@@ -136,7 +137,7 @@ class Surface:
         nearest counts; one at less than `near_enough` spacings is taken at once. Where
         there is no surface around, the distance is infinite.
         """
-        points, normals = np.asarray(points, dtype=np.float64), unit(normals)
+        points, normals = np.asarray(points, dtype=np.float64), unit_vectors(normals)
         places, outward, best = self._found(points, normals)
         # What is not near enough tries the normals around, those that differ.
         poor = np.flatnonzero(best > near_enough * self.spacing)
@@ -166,7 +167,9 @@ class Surface:
         self, points: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Places and normals as of `project`, and whether (m,) there is a surface around."""
-        found = _in_parts(self._settled_at_once, np.array(points, np.float64), unit(normals))
+        found = _in_parts(
+            self._settled_at_once, np.array(points, np.float64), unit_vectors(normals)
+        )
         return found[0], found[1], found[2]
 
     def _settled_at_once(
@@ -181,7 +184,7 @@ class Surface:
                 points[moving], normals[moving], around[moving], facing[moving]
             )
             if number >= _WHOLE:  # the whole turn leads to and fro between two sets of points
-                outward = unit(outward + normals[moving])
+                outward = unit_vectors(outward + normals[moving])
             moved = np.linalg.norm(places - points[moving], axis=1) > _SETTLED * self.spacing
             moved |= np.linalg.norm(outward - normals[moving], axis=1) > _SETTLED
             points[moving], normals[moving] = places, outward
@@ -212,7 +215,7 @@ class Surface:
         fitted &= ((weight > 0) & (distance < 2.0 * self.spacing)).any(axis=1)
         enough = fitted[:, None]
         mean = (weight[:, None] @ around_normals)[:, 0]
-        normals = np.where(enough, unit(mean), normals)
+        normals = np.where(enough, unit_vectors(mean), normals)
         frame = tangent_frames(normals)
         offset = offset @ frame.transpose(0, 2, 1)
         found = quadrics(offset[..., :2] / self.spacing, offset[..., 2:], weight)
@@ -224,7 +227,7 @@ class Surface:
         height = np.where(enough, np.clip(found[:, 0], -self.spacing, self.spacing), 0.0)
         slope = np.where(enough, found[:, 1:3, 0] / self.spacing, 0.0)
         tilted = normals - np.einsum("ma,mab->mb", slope, frame[:, :2])
-        return points + height * normals, unit(tilted), fitted
+        return points + height * normals, unit_vectors(tilted), fitted
 
     def smooth_normals(
         self, points: np.ndarray, normals: np.ndarray, radius_m: float
@@ -235,7 +238,7 @@ class Surface:
         itself, which is found from `normals` (m, 3): what a flat tool of that radius feels.
         """
         points = np.asarray(points, dtype=np.float64)
-        return _in_parts(partial(self._smooth_at_once, radius_m), points, unit(normals))[0]
+        return _in_parts(partial(self._smooth_at_once, radius_m), points, unit_vectors(normals))[0]
 
     def _smooth_at_once(
         self, radius_m: float, points: np.ndarray, normals: np.ndarray
@@ -251,7 +254,7 @@ class Surface:
             facing = np.maximum(facing - SAME_SIDE, 0.0)
             weight = np.maximum(1.0 - (distance / radius) ** 2, 0.0) ** 2 * facing
             mean = (weight[:, None] @ around[turning])[:, 0]
-            found = np.where(weight.any(axis=1)[:, None], unit(mean), normals[turning])
+            found = np.where(weight.any(axis=1)[:, None], unit_vectors(mean), normals[turning])
             turned = np.linalg.norm(found - normals[turning], axis=1) > _SETTLED
             normals[turning] = found
             turning = turning[turned]
@@ -294,23 +297,6 @@ def typical_spacing(distance: np.ndarray, number: int) -> float:
     `number`-th neighbours."""
     # Of points spread at random, half have that neighbour within this area.
     return float(np.median(distance) * np.sqrt(np.pi / (number - 1.0 / 3.0)))
-
-
-def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) brought to unit length; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors) / np.maximum(length, 1e-12)
-
-
-def tangent_frames(normals: np.ndarray) -> np.ndarray:
-    """Right-handed frames (m, 3, 3) at unit normals (m, 3): rows are two tangents, the normal."""
-    x, y, z = normals.T
-    zero = np.zeros_like(x)
-    flat = np.abs(x) < 0.7  # the first is square to the x axis, or to y where the normal is along x
-    first = np.stack([np.where(flat, zero, -z), np.where(flat, z, zero), np.where(flat, -y, x)])
-    u, v, w = first / np.maximum(np.sqrt((first * first).sum(axis=0)), 1e-12)
-    frames = np.stack([u, v, w, y * w - z * v, z * u - x * w, x * v - y * u, x, y, z], axis=1)
-    return frames.reshape(-1, 3, 3)
 
 
 def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:

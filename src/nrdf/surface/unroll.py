@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from nrdf.surface.surface import tangent_frames
+from nrdf.geometry.frames import tangent_frames
 
 _ROUNDS = 12
 

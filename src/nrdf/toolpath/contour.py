@@ -6,6 +6,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.grid import Grid
 from nrdf.surface.patch import Patch
 from nrdf.toolpath.raster import Stroke, strip_middles
@@ -85,10 +86,9 @@ def _anticlockwise(ring: Stroke) -> Stroke:
 
 def _smooth(line: Stroke, reach: float) -> Stroke:
     """A line with its corners, and what the ragged border has left in it, rounded; even steps."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = max(int(np.ceil(length[-1] / (0.25 * reach))), 8)
-    at = np.linspace(0.0, length[-1], count + 1)
-    even = np.stack([np.interp(at, length, line[:, k]) for k in (0, 1)], axis=1)
+    length = arc_length(line)
+    at = even_arc_lengths(float(length[-1]), 0.25 * reach, least=8)
+    even, count = interpolate(at, length, line), len(at) - 1
     # Short rings would shrink to nothing.
     sigma = min(reach * count / length[-1], 0.05 * count)
     if np.array_equal(line[0], line[-1]):
@@ -138,7 +138,7 @@ def _wound(
     ring = _started_near(chain[0], end)
     pieces = [ring]
     for inner in chain[1:]:
-        walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ring, axis=0), axis=1))])
+        walked = arc_length(ring)
         here, there = (float(grid.sample(depth, r).mean()) for r in (ring, inner))
         wanted = here + (there - here) * walked / walked[-1]
         turn, farthest = ring, 2.0 * abs(there - here)

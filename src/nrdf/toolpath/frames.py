@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nrdf.surface.surface import unit
+from nrdf.geometry.frames import frames_from_z_and_x, unit_vectors, without_sign_jumps
 
 
 def travel_of(positions: np.ndarray, smooth_m: float = 0.0) -> np.ndarray:
@@ -27,7 +27,7 @@ def travel_of(positions: np.ndarray, smooth_m: float = 0.0) -> np.ndarray:
     at = np.arange(len(positions)) + len(ends[0])
     first = np.maximum(at - count, 0)
     last = np.minimum(at + count, len(padded))
-    return unit(total[last] - total[first])
+    return unit_vectors(total[last] - total[first])
 
 
 def surface_frames(travel: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -36,13 +36,7 @@ def surface_frames(travel: np.ndarray, normals: np.ndarray) -> np.ndarray:
     travel: (n, 3), need not be tangential; normals: (n, 3), unit, outward. z = -normal, x is the
     travel in the tangent plane, y = z × x is to the right of the travel seen from outside.
     """
-    z = -unit(normals)
-    y = np.cross(z, travel)
-    # Straight in or out of the surface there is no travel in it: any x will do.
-    helper = np.where(np.abs(z[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    lost = np.linalg.norm(y, axis=1, keepdims=True) < 1e-6
-    y = unit(np.where(lost, np.cross(z, helper), y))
-    return np.stack([np.cross(y, z), y, z], axis=-1)
+    return frames_from_z_and_x(-unit_vectors(normals), travel)
 
 
 def lean_rotation(lead_rad: float, tilt_rad: float) -> Rotation:
@@ -62,11 +56,4 @@ def tool_quaternions(
     travel, normals: (n, 3), as for `surface_frames`; lead and tilt as for `lean_rotation`.
     """
     upright = Rotation.from_matrix(surface_frames(travel, normals))
-    return steady((upright * lean_rotation(lead_rad, tilt_rad)).as_quat())
-
-
-def steady(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (n, 4) of the same rotations, their signs chosen so that none jumps."""
-    same = np.einsum("na,na->n", quaternions[1:], quaternions[:-1]) >= 0.0
-    sign = np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])
-    return quaternions * sign[:, None]
+    return without_sign_jumps((upright * lean_rotation(lead_rad, tilt_rad)).as_quat())

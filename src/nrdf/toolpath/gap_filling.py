@@ -8,8 +8,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.frames import tangent_frames, unit_vectors
+from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.patch import Patch
-from nrdf.surface.surface import Surface, tangent_frames, unit
+from nrdf.surface.surface import Surface
 from nrdf.toolpath.sampled_path import Neighbours, Track, line_spacing, track_of
 from nrdf.toolpath.surface_path import Line, touching
 
@@ -120,8 +122,10 @@ def _between(
             )
             turned = normal[run[[0, *range(len(run)), -1]]]
             whole = np.concatenate([first[None], middle[run], last[None]])
-            way, walked = _resampled(whole, spacing_m)
-            ways.append((way, unit(np.stack([np.interp(*walked, n) for n in turned.T], axis=1))))
+            along = arc_length(whole)
+            at_even = even_arc_lengths(float(along[-1]), spacing_m, nearest=True)
+            way = interpolate(at_even, along, whole)
+            ways.append((way, unit_vectors(interpolate(at_even, along, turned))))
             tried.append(way)
     return ways
 
@@ -134,17 +138,8 @@ def _on_patches(
     for number in np.unique(patch):
         here = patch == number
         places[here], along = patches[number].at(uv[here])
-        normals[here] = unit(np.cross(along[:, 0], along[:, 1]))
+        normals[here] = unit_vectors(np.cross(along[:, 0], along[:, 1]))
     return places, normals
-
-
-def _resampled(
-    way: np.ndarray, spacing_m: float
-) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Places (m, 3) evenly along a way (n, 3); how far along they (m,) and the way's (n,) are."""
-    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-    at = np.linspace(0.0, walked[-1], max(int(np.rint(walked[-1] / spacing_m)), 1) + 1)
-    return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1), (at, walked)
 
 
 def _groups(surface: Surface, left: np.ndarray, near: float) -> list[np.ndarray]:
@@ -165,13 +160,13 @@ def _groups(surface: Surface, left: np.ndarray, near: float) -> list[np.ndarray]
 def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
     """A way along the longest extent of points (k,)."""
     points = surface.points[group]
-    normal = unit(surface.normals[group].mean(axis=0))
+    normal = unit_vectors(surface.normals[group].mean(axis=0))
     middle = points.mean(axis=0)
     offset = points - middle
     along = tangent_frames(normal[None])[0, 0]
     if len(group) > 1:
         along = np.linalg.svd(offset, full_matrices=False)[2][0]
-        along = unit(along - along @ normal * normal)
+        along = unit_vectors(along - along @ normal * normal)
     ahead = offset @ along
     half = 0.5 * max(_SHORTEST * spacing_m, float(np.ptp(ahead)))
     at = np.linspace(-half, half, max(int(np.rint(2.0 * half / spacing_m)), 1) + 1)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.polylines import step_lengths, total_length
 from nrdf.surface.accessibility import with_room
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.patch import Patch, inside_margin, patches_of
@@ -133,7 +134,7 @@ def measure(
     if not work:
         raise ProcessError("a tool path without a process segment cannot be measured")
     wanted = Wanted.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
-    axes = [_axes(segment) for segment in work]
+    axes = [segment.axes for segment in work]
     contacts = [
         s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
     ]
@@ -188,23 +189,14 @@ def _jumps(
     for segment, line, axis in zip(work, contacts, axes, strict=True):
         if len(line) < 2:
             continue
-        far = np.maximum(_steps(segment.positions), _steps(line))
+        far = np.maximum(step_lengths(segment.positions), step_lengths(line))
         # Twice the arctangent of the chords' ratio: exact for small angles too.
-        apart = np.linalg.norm(np.diff(axis, axis=0), axis=1)
+        apart = step_lengths(axis)
         together = np.linalg.norm(axis[1:] + axis[:-1], axis=1)
         turned = 2.0 * np.arctan2(apart, together)
         step, turn = max(step, float(far.max())), max(turn, float(turned.max()))
         bend = max(bend, float((turned / np.maximum(far, _SHORTEST_M)).max()))
     return step, turn, bend
-
-
-def _steps(line: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.diff(line, axis=0), axis=1)
-
-
-def _axes(segment: Segment) -> np.ndarray:
-    """Tool z (n, 3) of a segment."""
-    return Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
 
 
 def _fit(
@@ -241,7 +233,7 @@ def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float
         if end is not None:
             free = float(np.linalg.norm(segment.positions[0] - end))
             between, time = between + free, time + free / free_feed
-        length = float(np.linalg.norm(np.diff(segment.positions, axis=0), axis=1).sum())
+        length = total_length(segment.positions)
         time += length / segment.feed_m_s + segment.dwell_s
         if segment.kind == "process":
             process += length

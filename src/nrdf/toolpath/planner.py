@@ -9,12 +9,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.frames import without_sign_jumps
 from nrdf.surface.accessibility import with_room
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.contour import contour, spiral
 from nrdf.toolpath.effort import check_effort, check_passes
-from nrdf.toolpath.frames import lean_rotation, steady, surface_frames, travel_of
+from nrdf.toolpath.frames import lean_rotation, surface_frames, travel_of
 from nrdf.toolpath.gap_filling import fill_gaps, touch_up
 from nrdf.toolpath.raster import Stroke, raster
 from nrdf.toolpath.sampled_path import line_spacing, track_of
@@ -86,7 +87,9 @@ def add_approach_retract(
             if index % 2:
                 positions, outward = positions[::-1], outward[::-1]
                 half = Rotation.from_rotvec(np.pi * outward)
-                quaternions = steady((half * Rotation.from_quat(quaternions[::-1])).as_quat())
+                quaternions = without_sign_jumps(
+                    (half * Rotation.from_quat(quaternions[::-1])).as_quat()
+                )
             segments += _segments(positions, quaternions, outward, number, strategy)
             number += 1
     return tuple(segments)
@@ -101,7 +104,7 @@ def _tool_segments(
     turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
     places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
-    quaternions = [steady(part) for part in np.split(turned.as_quat(), cuts)]
+    quaternions = [without_sign_jumps(part) for part in np.split(turned.as_quat(), cuts)]
     return [
         Segment("process", number, positions, held, strategy.feed_m_s, strategy.force_n)
         for number, (positions, held) in enumerate(

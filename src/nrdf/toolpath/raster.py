@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy import ndimage
 
+from nrdf.geometry.polylines import total_length
 from nrdf.surface.grid import Grid
 from nrdf.surface.patch import Patch
 
@@ -44,7 +45,7 @@ def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> li
 
 def _long(strokes: list[Stroke], least: float) -> list[Stroke]:
     """Strokes no shorter than `least`; the longest, if there are none."""
-    length = [float(np.linalg.norm(np.diff(s, axis=0), axis=1).sum()) for s in strokes]
+    length = [total_length(s) for s in strokes]
     least = min(least, max(length))
     return [stroke for stroke, way in zip(strokes, length, strict=True) if way >= least]
 

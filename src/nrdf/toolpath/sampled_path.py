@@ -8,9 +8,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch
-from nrdf.surface.surface import unit
 from nrdf.toolpath.frames import travel_of
 from nrdf.toolpath.surface_path import Line
 
@@ -40,16 +41,16 @@ class Track:
         places, turned, travel, walked = [], [], [], []
         far = 0.0
         for line, axis in zip(contacts, axes, strict=True):
-            way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-            at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / step)), 1) + 1)
-            fine = np.stack([np.interp(at, way, line[:, k]) for k in range(3)], axis=1)
+            way = arc_length(line)
+            at = even_arc_lengths(float(way[-1]), step)
+            fine = interpolate(at, way, line)
             places.append(fine)
-            turned.append(np.stack([np.interp(at, way, axis[:, k]) for k in range(3)], axis=1))
+            turned.append(interpolate(at, way, axis))
             travel.append(travel_of(fine, smooth) if len(line) > 1 else np.zeros_like(fine))
             walked.append(far + at)
             far += way[-1] + 1e3
         place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
-        return Track(place, unit(axis), ahead, way, step)
+        return Track(place, unit_vectors(axis), ahead, way, step)
 
     def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
         """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
@@ -188,7 +189,9 @@ def _beside(
     order = np.lexsort((away, key))
     _, first = np.unique(key[order], return_index=True)
     i, j, share, crossing = (v[order][first] for v in (i, j, share, crossing))
-    whole = np.abs(np.einsum("pa,pa->p", unit(travel[i]), unit(travel[j]))) > _PARALLEL
+    whole = (
+        np.abs(np.einsum("pa,pa->p", unit_vectors(travel[i]), unit_vectors(travel[j]))) > _PARALLEL
+    )
     for part in np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]:
         whole &= patch.border.distance(place[i] + part * crossing) > _SURE * patch.spacing
     i, j, share, crossing = i[whole], j[whole], share[whole, None], crossing[whole]

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polylines import even_arc_lengths, interpolate, step_lengths, summed
 from nrdf.surface.patch import Patch
-from nrdf.surface.surface import Surface, unit
+from nrdf.surface.surface import Surface
 from nrdf.toolpath.raster import Stroke
 
 _TOUCHES, _RESTS = 4, 2e-4  # rounds, and the distance (m) at which a contact counts as found
@@ -41,15 +43,12 @@ def on_surface(
     even = []
     flat = patch.at(np.concatenate(strokes))[0]
     for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
-        plane = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
-        steps = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1), _JUMP * plane)
-        walked = np.concatenate([[0.0], np.cumsum(steps)])
-        count = max(int(np.rint(walked[-1] / spacing_m)), 1)
-        at = np.linspace(0.0, walked[-1], count + 1)
-        even.append(np.stack([np.interp(at, walked, stroke[:, a]) for a in (0, 1)], axis=1))
+        along = summed(np.minimum(step_lengths(way), _JUMP * step_lengths(stroke)))
+        at = even_arc_lengths(float(along[-1]), spacing_m, nearest=True)
+        even.append(interpolate(at, along, stroke))
     places = np.concatenate(even)
     flat, along = patch.at(places)
-    outward = unit(np.cross(along[:, 0], along[:, 1]))
+    outward = unit_vectors(np.cross(along[:, 0], along[:, 1]))
     contacts, normals, there = touching(surface, flat, outward, patch.spacing, radius_m)
     farthest = 2.0 * spacing_m + 0.5 * patch.spacing
     blocks, first = [], 0
@@ -60,7 +59,7 @@ def on_surface(
             last = int(next(ends))
             found = first + np.flatnonzero(there[first:last])
             # A waypoint that is missing alone is no gap; a step too far is.
-            step = np.linalg.norm(np.diff(contacts[found], axis=0), axis=1)
+            step = step_lengths(contacts[found])
             runs = np.split(found, np.flatnonzero(step > farthest) + 1)
             block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
             first = last

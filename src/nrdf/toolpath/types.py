@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import z_axes
 from nrdf.geometry.similarity import Similarity
 from nrdf.toolpath.strategy import Strategy
 
@@ -52,7 +52,7 @@ class Segment:
     @cached_property
     def axes(self) -> np.ndarray:
         """The tool's axes (n, 3), unit: tool z, into the part, in the job's frame."""
-        return np.asarray(Rotation.from_quat(self.quaternions_xyzw).as_matrix()[:, :, 2])
+        return z_axes(self.quaternions_xyzw)
 
     @property
     def waypoints(self) -> tuple[Waypoint, ...]:

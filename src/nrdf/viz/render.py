@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from nrdf.geometry.polylines import resample
+
 _OVERSAMPLING = 2
 _LINE, _DOT = 1.6, 5.0  # radius of a line, and of the dot at its beginning, in fine pixels
 _SUNK = 0.015  # canonical depth by which a line may lie in the surface and still be drawn on it
@@ -165,7 +167,7 @@ def _paint(
     lines = [line for line in lines if len(line)]
     if not lines:
         return
-    fine = np.concatenate([_resampled(line, 0.5 / pixels) for line in lines])
+    fine = np.concatenate([resample(line, 0.5 / pixels) for line in lines])
     for points, radius in ((fine, _LINE), (lines[0][:1], _DOT)):
         view = points @ axes.T
         column, row = np.floor((view[:, :2] - corner) * pixels).astype(int).T
@@ -178,14 +180,6 @@ def _paint(
         x, y = x[which, at], y[which, at]
         seen = view[which, 2] > cover[y, x]
         image[y[seen], x[seen]] = ink
-
-
-def _resampled(line: np.ndarray, step: float) -> np.ndarray:
-    """A line (k, 3) as points at most `step` apart."""
-    length = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    at = np.concatenate([[0.0], np.cumsum(length)])
-    fine = np.linspace(0.0, at[-1], int(at[-1] / step) + 1)
-    return np.stack([np.interp(fine, at, line[:, i]) for i in range(3)], axis=1)
 
 
 def _close_pinholes(

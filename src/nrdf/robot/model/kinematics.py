@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nrdf.geometry.frames import rotations_about
+
 
 @dataclass(frozen=True)
 class Chain:
@@ -47,7 +49,7 @@ class Chain:
                 places[i + 1] += (turned @ self.axes[i]) * joints[:, i, None]
                 rotations[i + 1] = turned
             else:
-                rotations[i + 1] = turned @ _turn(self.axes[i], joints[:, i])
+                rotations[i + 1] = turned @ rotations_about(self.axes[i], joints[:, i])
         tool = rotations[-1] @ self.T_last_tool[:3, :3]
         tcp = places[-1] + rotations[-1] @ self.T_last_tool[:3, 3]
         return Frames(self, rotations, places, tool, tcp)
@@ -96,12 +98,3 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return np.stack([x, y, z], axis=-1)
-
-
-def _turn(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotations (b, 3, 3) about a unit axis (3,) by angles (b,): Rodrigues' formula."""
-    x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, versine = np.sin(angle), 1.0 - np.cos(angle)
-    flat = np.eye(3) + sine[:, None, None] * skew + versine[:, None, None] * (skew @ skew)
-    return np.asarray(flat)

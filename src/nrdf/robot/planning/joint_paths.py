@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from nrdf.geometry.polylines import interpolate, step_lengths
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import LEAST_CLEARANCE_M, solve
 from nrdf.robot.planning.lines import Line
@@ -105,16 +106,14 @@ def between(
 def _numbers(positions: np.ndarray, axes: np.ndarray) -> np.ndarray:
     if len(positions) == 1:
         return np.zeros(1)
-    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(axes, axis=0), axis=1)
+    moved, turned = step_lengths(positions), step_lengths(axes)
     counts = np.ceil(np.maximum(moved / _FINE_M, turned / _FINE_RAD)).astype(int).clip(1, 80)
     steps = [k + np.arange(count) / count for k, count in enumerate(counts)]
     return np.append(np.concatenate(steps), len(positions) - 1.0)
 
 
 def _interpolated(number: np.ndarray, values: np.ndarray) -> np.ndarray:
-    known = np.arange(len(values))
-    return np.stack([np.interp(number, known, column) for column in values.T], axis=1)
+    return interpolate(number, np.arange(len(values)), values)
 
 
 def add_approach_retract(

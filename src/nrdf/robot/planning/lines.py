@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.polylines import resample, total_length
 from nrdf.toolpath.types import Segment, ToolPath
 
 _STEP_M = 0.012
@@ -61,7 +61,7 @@ def lines_of(path: ToolPath) -> tuple[Line, ...]:
         before = segments[i - 1] if i and segments[i - 1].kind == "approach" else None
         after = segments[i + 1] if i + 1 < len(segments) else None
         after = after if after is not None and after.kind == "retract" else None
-        axes = Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
+        axes = segment.axes
         first, last = segment.positions[0], segment.positions[-1]
         made.append(
             Line(
@@ -88,9 +88,6 @@ def _lead(
         way = np.stack([end - _SHORT_M * axis, end])
     else:
         way = segment.positions[::-1] if backwards else segment.positions
-    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))])
-    if walked[-1] < 1e-6:
+    if total_length(way) < 1e-6:
         return np.zeros((0, 3))
-    count = max(int(np.ceil(walked[-1] / _STEP_M)), 1)
-    at = np.linspace(0.0, walked[-1], count + 1)[:-1]
-    return np.stack([np.interp(at, walked, way[:, k]) for k in range(3)], axis=1)
+    return resample(way, _STEP_M)[:-1]

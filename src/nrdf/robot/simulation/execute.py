@@ -17,6 +17,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from nrdf.geometry.polylines import step_lengths, summed
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.model.tool import PAD_GIVES_M
 from nrdf.robot.planning.program import Action
@@ -255,9 +256,8 @@ def _gaps(
     plan: _Plan, cell: Cell, action: Action, surface: Surface, shift_m: np.ndarray
 ) -> np.ndarray:
     """How far (t,) the shifted object's surface is along the tool's axis from the planned tool."""
-    moved = np.linalg.norm(np.diff(plan.places, axis=0), axis=1)
-    turned = np.linalg.norm(np.diff(plan.axes, axis=0), axis=1)
-    walked = np.concatenate([[0.0], np.cumsum(moved + _ASKED_M / _ASKED_RAD * turned)])
+    moved, turned = step_lengths(plan.places), step_lengths(plan.axes)
+    walked = summed(moved + _ASKED_M / _ASKED_RAD * turned)
     asked = np.unique(np.floor(walked / _ASKED_M).astype(int), return_index=True)[1]
     asked = np.union1d(asked, [len(walked) - 1])
     pose = cell.poses[action.turn]

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
 from nrdf.robot.model.cell import Cell
@@ -203,11 +204,9 @@ def _swept(
     places: list[np.ndarray] = [np.zeros((0, 3))]
     axes: list[np.ndarray] = [np.zeros((0, 3))]
     for positions, own in parts:
-        steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-        way = np.concatenate([[0.0], np.cumsum(steps)])
-        at = np.linspace(0.0, way[-1], max(int(np.ceil(way[-1] / _FINE_M)), 1) + 1)
-        place = np.stack([np.interp(at, way, positions[:, k]) for k in range(3)], axis=1)
-        axis = np.stack([np.interp(at, way, own[:, k]) for k in range(3)], axis=1)
+        along = arc_length(positions)
+        at = even_arc_lengths(float(along[-1]), _FINE_M)
+        place, axis = interpolate(at, along, positions), interpolate(at, along, own)
         places.append(place + height * axis)
         axes.append(axis)
     return np.concatenate(places), np.concatenate(axes)

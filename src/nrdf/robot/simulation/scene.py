@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.model.tool import Part
@@ -42,7 +42,7 @@ def cell_specification(cell: Cell) -> Any:
 
 def _mount(body: Any, T_body_flange: np.ndarray, parts: tuple[Part, ...]) -> None:
     tool = body.add_body(name=_TOOL, pos=T_body_flange[:3, 3], gravcomp=1.0)
-    tool.quat = _wxyz(T_body_flange[:3, :3])
+    tool.quat = quaternions_wxyz(T_body_flange[:3, :3])
     tool.add_site(name=_SENSOR)
     for part in parts:
         kind = mujoco.mjtGeom.mjGEOM_CYLINDER if part.flat else mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -72,10 +72,6 @@ def _add_motors(spec: Any, cell: Cell) -> None:
         motor.gainprm[0] = stiff
         motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         motor.biasprm[1], motor.biasprm[2] = -stiff, -2.0 * STIFFNESS_1_S * inertia
-
-
-def _wxyz(rotation: np.ndarray) -> np.ndarray:
-    return np.asarray(np.roll(Rotation.from_matrix(rotation).as_quat(), 1))
 
 
 class SimulatedArm:

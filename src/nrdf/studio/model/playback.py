@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.robot.model.cell import COLUMN_M
 from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.planning.timing import STEP_S
@@ -136,7 +137,7 @@ class _Mover:
             mujoco.mj_kinematics(self._model, self._data)
             places[k], matrices[k] = self._data.xpos[1:], self._data.xmat[1:]
         turned = self._turn @ matrices.reshape(-1, 3, 3)
-        quaternions = np.roll(Rotation.from_matrix(turned).as_quat(), 1, axis=1)
+        quaternions = quaternions_wxyz(turned)
         return places @ self._turn.T + self._place, quaternions.reshape(*places.shape[:2], 4)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import viser
-from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.geometry.similarity import about_up
 from nrdf.studio.model.playback import EVERY_PATH, FLOOR, Playback
 from nrdf.studio.scene.scene_view import ObjectView
@@ -25,7 +25,7 @@ class ArmView:
         self.object_view, self.playback = object_view, playback
         self._factor = object_view.scene_view.factor
         self._scene = object_view.scene_view.server.scene
-        wxyz = np.roll(Rotation.from_matrix(_CELL).as_quat(), 1)
+        wxyz = quaternions_wxyz(_CELL)
         self._root = self._scene.add_frame("/arm", show_axes=False, wxyz=wxyz)
         self._bodies: dict[int, viser.FrameHandle] = {}
         self._tools: dict[int, list[viser.MeshHandle]] = {}

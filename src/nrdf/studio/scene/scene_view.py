@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 import viser
-from scipy.spatial.transform import Rotation
 
+from nrdf.geometry.frames import quaternions_wxyz, unit_vectors
 from nrdf.studio.model.paintable_cloud import PaintableCloud
 from nrdf.studio.scene.camera import Camera, hit
-from nrdf.surface.surface import unit
 
 FOV_RAD = np.radians(48.0)
 _FROM = np.array([0.86, 0.52, 0.34])
@@ -93,7 +92,7 @@ class ObjectView:
         """Move the object; offset (3,) in the scene, rotation (3, 3) from its own frame."""
         self.offset, self._rotation = offset, np.eye(3) if rotation is None else rotation
         self.frame.position = tuple(offset)
-        self.frame.wxyz = tuple(np.roll(Rotation.from_matrix(self._rotation).as_quat(), 1))
+        self.frame.wxyz = tuple(quaternions_wxyz(self._rotation))
 
     def paint(self, colours: np.ndarray) -> None:
         """Colours (k, 3) uint8 of the shown points, which are shaded here."""
@@ -237,8 +236,8 @@ class SceneView:
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        toward = unit(_FROM if beside is None else _FROM_BESIDE)
-        right = unit(np.cross([0.0, 1.0, 0.0], toward))
+        toward = unit_vectors(_FROM if beside is None else _FROM_BESIDE)
+        right = unit_vectors(np.cross([0.0, 1.0, 0.0], toward))
         axes = np.stack([right, np.cross(toward, right), toward])
         seen = (corners - middle) @ axes.T
         half = np.tan(FOV_RAD / 2) * np.array([aspect, 1.0])
