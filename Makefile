@@ -1,6 +1,7 @@
 # make demo: an environment, then nrdf at work on bundled shapes, in demo/
 # make studio: an environment, then the studio in a browser; its session is kept in studio/
 # make test: an environment with the tools, then ruff, mypy and all tests
+# make docs: the documentation as a site, in build/site/
 # make fuzz: damaged files of every kind until stopped, or for as long as: make fuzz MINUTES=10
 # Another interpreter: make PYTHON=/path/to/python3.12 test
 
@@ -11,7 +12,7 @@ SUITABLE := -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10)
 PYTHON ?= $(shell for name in $(CANDIDATES); do \
 	$$name $(SUITABLE) 2>/dev/null && { echo $$name; break; }; done)
 
-.PHONY: demo studio test fuzz format clean
+.PHONY: demo studio test docs fuzz format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/nrdf.stamp
@@ -25,6 +26,9 @@ test: $(VENV)/dev.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest
+
+docs: $(VENV)/dev.stamp
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 fuzz: $(VENV)/dev.stamp
 	$(BIN)/python tools/fuzz.py $(MINUTES)

@@ -1,5 +1,5 @@
-"""Draw docs/studio.png, the studio with the bundled chair's processes brought to another chair, and
-docs/studio-arm.png, the same on the arm in simulation.
+"""Draw docs/images/studio.png, the studio with the bundled chair's processes brought to another chair, and
+docs/images/studio-arm.png, the same on the arm in simulation.
 
     python tools/studio_picture.py CHROMIUM
 
@@ -24,7 +24,7 @@ from nrdf.studio.model.session import Session
 from nrdf.studio.model.uploads import bundled
 from nrdf.studio.serving import open_server
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "images"
 FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader")  # fmt: skip
 SIZE = {"width": 1500, "height": 900}

@@ -1,4 +1,4 @@
-"""Measure what docs/studio.md says about speed, on the bundled chairs.
+"""Measure what docs/guides/studio.md says about speed, on the bundled chairs.
 
     python tools/studio_speed.py
 

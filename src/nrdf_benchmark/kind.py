@@ -1,7 +1,7 @@
 """How well the check of the kind of object tells: real objects of it, turned ones, and others.
 
 The others are meshes of everyday objects of which training has seen none of the same name
-(`nrdf.training.kind.is_held_out`). Definitions of the figures: docs/scans.md.
+(`nrdf.training.kind.is_held_out`). Definitions of the figures: docs/evidence/scans.md.
 """
 
 from __future__ import annotations

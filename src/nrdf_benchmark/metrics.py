@@ -1,6 +1,6 @@
 """How far a retrieved region is from the true one, in the unit of the points given.
 
-Formulas and their sources: docs/benchmark.md.
+Formulas and their sources: docs/evidence/bsrc.md.
 """
 
 from __future__ import annotations

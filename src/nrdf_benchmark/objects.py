@@ -5,7 +5,7 @@
     <category>/<name>.npz     vertices (v, 3), faces (f, 3), face_label_fine or face_label (f,)
 
 Files are data of strangers: nothing in them is run, and what they claim is checked before room is
-made for it. docs/benchmark.md says more.
+made for it. docs/evidence/objects.md says more.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ def _read_text(path: Path) -> str:
     except DataError as error:
         raise DataError(
             f"{error}; a folder of labelled objects has {LABELS}, {INDEX} and "
-            "<category>/<name>.npz (docs/benchmark.md)"
+            "<category>/<name>.npz (docs/evidence/objects.md)"
         ) from None
 
 

@@ -1,6 +1,6 @@
 """What was measured on labelled objects, in rows: of the table, and of every pair and part.
 
-Definitions: docs/benchmark.md.
+Definitions: docs/evidence/objects.md.
 """
 
 from __future__ import annotations

@@ -348,11 +348,13 @@ def test_the_json_schema_knows_the_other_units():
 
 
 def test_the_file_in_the_documentation_is_right():
-    text = (Path(__file__).parents[2] / "docs" / "process.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "guides" / "teach.md").read_text(encoding="utf-8")
     (region,) = parse_knowledge(text.split("```yaml\n")[1].split("```")[0], "docs").regions
     assert [process.kind for process in region.processes] == ["sand", "oil"]
     fields = set(Process.model_fields) - {"label"}
-    assert all(f"`{field}`" in text for field in fields), "a field that docs/process.md leaves out"
+    assert all(f"`{field}`" in text for field in fields), (
+        "docs/guides/teach.md leaves out a field"
+    )
 
 
 def test_names_are_those_of_the_planner_and_of_clouds():

@@ -21,7 +21,7 @@ def export(
     """Write a job's tool paths for a robot, a machine tool or CAM.
 
     Formats: ros2-bag, noether, apt, gcode, urscript, rapid, krl, csv, json. Each gets a folder of
-    its name in the output folder. What each carries, and how to load it: docs/export.md.
+    its name in the output folder. What each carries, and how to load it: docs/guides/export.md.
 
     Example: nrdf export job/ --format urscript csv --out programs/
 

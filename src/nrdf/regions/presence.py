@@ -39,7 +39,7 @@ class Evidence(NamedTuple):
 
 # A logistic regression of the overlap with the true region, 0 where the target lacks it, on parts
 # of labelled real objects and on members of families, whole and in scans of three views: what
-# `nrdf eval presence` prints (docs/scans.md).
+# `nrdf eval presence` prints (docs/evidence/scans.md).
 BIAS = -0.78
 WEIGHTS = Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46)
 SURELY_ABSENT = 0.02

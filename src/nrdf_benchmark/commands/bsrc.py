@@ -42,7 +42,7 @@ def bsrc(
     On the Benchmark for Surface Region Correspondence (BSRC), every ordered pair of the objects
     that are there. CD-L1 in the paper's convention: for every point the Manhattan distance to its
     nearest neighbour in the other set, averaged, summed over both directions. Lower is better.
-    With --out also every other metric (docs/benchmark.md), as Markdown, CSV and JSON, and a
+    With --out also every other metric (docs/evidence/bsrc.md), as Markdown, CSV and JSON, and a
     picture; interrupted, the same command goes on where it was.
 
     Methods: copy, box, copy-normals, box-normals, box-mask, registration (nothing learned); ndf,

@@ -24,7 +24,7 @@ def kind(
 
     Real objects of the category, as they are and turned, and objects of other kinds; with
     --scans-every also simulated scans of three views, after alignment. Nothing of it was trained
-    on: docs/scans.md.
+    on: docs/evidence/scans.md.
 
     Example: nrdf eval kind --category chair --shapes shapes/ --bsrc bsrc/ --labelled objects/ikea/
     --others objects/m3/
