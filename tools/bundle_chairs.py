@@ -2,7 +2,8 @@
 
     python tools/bundle_chairs.py [objects/]
 
-With a folder of labelled objects (docs/evidence/objects.md) that has it, also the mesh of the real chair.
+With a folder of labelled objects (docs/evidence/objects.md) that has it, also the mesh of the real
+chair.
 
 Writes src/nrdf/bundled/<name>.npz: points (8192, 3) float32 in metres, without normals, as a
 sensor would give them; region (8192,) uint8, the index into `regions` (name 0 is "none"). And the

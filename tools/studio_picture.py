@@ -1,5 +1,5 @@
-"""Draw docs/images/studio.png, the studio with the bundled chair's processes brought to another chair, and
-docs/images/studio-arm.png, the same on the arm in simulation.
+"""Draw docs/images/studio.png, the studio with the bundled chair's processes brought to another
+chair, and docs/images/studio-arm.png, the same on the arm in simulation.
 
     python tools/studio_picture.py CHROMIUM
 

@@ -1,7 +1,8 @@
 """Scans with known truth: how well poses are found, and regions on what was seen.
 
 Objects are members of the parametric families that training has not seen, and meshes where there
-are any; cameras are simulated (`nrdf.scans.simulate`). Definitions of the figures: docs/evidence/scans.md.
+are any; cameras are simulated (`nrdf.scans.simulate`). Definitions of the figures:
+docs/evidence/scans.md.
 """
 
 from __future__ import annotations

@@ -352,9 +352,7 @@ def test_the_file_in_the_documentation_is_right():
     (region,) = parse_knowledge(text.split("```yaml\n")[1].split("```")[0], "docs").regions
     assert [process.kind for process in region.processes] == ["sand", "oil"]
     fields = set(Process.model_fields) - {"label"}
-    assert all(f"`{field}`" in text for field in fields), (
-        "docs/guides/teach.md leaves out a field"
-    )
+    assert all(f"`{field}`" in text for field in fields), "docs/guides/teach.md leaves out a field"
 
 
 def test_names_are_those_of_the_planner_and_of_clouds():

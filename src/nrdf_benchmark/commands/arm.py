@@ -12,7 +12,8 @@ from nrdf.commands.one_run import one_run_at
 
 @one_run_at("out")
 def arm(demo: Positional[Path], out: Path | None = None) -> None:
-    """Simulate the demonstration's chairs on the bundled arm, against the bars of docs/evidence/robot.md.
+    """Simulate the demonstration's chairs on the bundled arm, against the bars of
+    docs/evidence/robot.md.
 
     Reach, accuracy, collisions, force, coverage and speed, by chair and of all of them.
     Needs MuJoCo: pip install 'nrdf[robot]'.

@@ -41,8 +41,8 @@ def objects(
     Each part of a reference is a region, and is found on a target: intersection over union with the
     target's own label, for all ordered pairs of a category or group. Also how often a part that the
     target has is told absent, and one that it lacks is; and how many pairs come from the target's
-    file to robot programs. Interrupted, the same command goes on. docs/evidence/objects.md has the data's
-    form and every definition.
+    file to robot programs. Interrupted, the same command goes on. docs/evidence/objects.md has the
+    data's form and every definition.
 
     Example: nrdf eval objects --data objects/ --out results/
 
