@@ -14,7 +14,7 @@ from nrdf.toolpath.metrics import Measures
 from nrdf.toolpath.types import ToolPath
 
 MIN_CONFIDENCE = 0.25
-"""A region found with less mean confidence is skipped (docs/scans.md)."""
+"""A region found with less mean confidence is skipped (docs/guides/scans.md)."""
 
 
 @dataclass(frozen=True)
