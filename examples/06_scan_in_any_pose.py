@@ -24,7 +24,7 @@ for step in aligned.cleaned.steps:
     print(f"{step.name:10s} {step.removed:6d} points removed: {step.note}")
 print("T_scan_canonical\n", aligned.pose.T_scan_canonical.round(3))
 print(f"longest side {aligned.pose.scale:.3f} {aligned.unit.name} ({aligned.unit.origin})")
-print("\n".join(aligned.doubts) or "no doubts")
+print("\n".join(aligned.warnings) or "no warnings")
 
 reference, regions = bundled_chair("reference")
 matches = model.set_reference(reference).retrieve_all(regions, aligned.encode())

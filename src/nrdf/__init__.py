@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from nrdf.regions.model import Model, load_model
     from nrdf.regions.reference import EncodedReference
     from nrdf.reports.job_folder import write_job
-    from nrdf.scans.target import align
+    from nrdf.scans.aligned_scan import align
 
 __all__ = [
     "CloudError",
@@ -81,7 +81,7 @@ _HOMES = {
     **dict.fromkeys(("ProcessTransfer", "load_process"), "nrdf.process.transfer"),
     "TransferResult": "nrdf.process.transfer_result",
     "Knowledge": "nrdf.process.knowledge",
-    "align": "nrdf.scans.target",
+    "align": "nrdf.scans.aligned_scan",
     "write_job": "nrdf.reports.job_folder",
     **dict.fromkeys((name for name in __all__ if name.endswith("Error")), "nrdf.errors"),
 }

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT
 from nrdf.geometry.canonical import bounding_box, canonical_transform
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import fibonacci_directions
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.association import VOTERS, snap, voters
+from nrdf.regions.association import nearest_voters, snap
 from nrdf.regions.region import region_indices
 from nrdf.shapes.registration import Carriers, RegistrationTemplate
 
@@ -170,7 +169,7 @@ def _voted(
 ) -> dict[str, np.ndarray]:
     """A target's points (m, 3) of which most of the nearest mapped points (n, 3) are in a region,
     by name."""
-    asked, _ = voters(mapped, mapped_normals, points, normals, NORMAL_WEIGHT, VOTERS)
+    asked, _ = nearest_voters(mapped, mapped_normals, points, normals)
     found = {}
     for name, indices in _all_indices(reference, regions).items():
         member = np.zeros(len(reference.points), bool)

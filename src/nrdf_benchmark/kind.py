@@ -1,7 +1,7 @@
 """How well the check of the kind of object tells: real objects of it, turned ones, and others.
 
 The others are meshes of everyday objects of which training has seen none of the same name
-(`nrdf.training.kind.is_held_out`). Definitions of the figures: docs/evidence/scans.md.
+(`nrdf.training.kind_network.is_held_out`). Definitions of the figures: docs/evidence/scans.md.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError
 from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.field.kind import KindNetwork
+from nrdf.field.kind_network import KindNetwork
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.sampling import downsample
 from nrdf.io.formats.mesh_file import load_mesh
-from nrdf.scans.kind import KindCheck, check_points
+from nrdf.scans.aligned_scan import clean_and_align
+from nrdf.scans.kind_check import KindCheck, check_points
 from nrdf.scans.pose_scorer import PoseScorer
-from nrdf.scans.target import bring_in
 from nrdf.shapes.prepare import find_meshes
-from nrdf.training.kind import is_held_out
+from nrdf.training.kind_network import is_held_out
 from nrdf_benchmark import scans
 from nrdf_benchmark.bsrc import read_bsrc
 from nrdf_benchmark.objects import read_objects
@@ -151,16 +151,16 @@ def labelled_figures(network: KindNetwork, category: str, labelled: Path) -> Ite
                 yield _figure(f"labelled meshes: {kind}", mesh.key, False, said)
 
 
-def scan_figures(judge: PoseScorer, shapes: Path, every: int) -> Iterator[Figure]:
+def scan_figures(scorer: PoseScorer, shapes: Path, every: int) -> Iterator[Figure]:
     """Simulated scans of three views of every so manieth test mesh, brought in by alignment."""
-    for number, item in enumerate(scans.meshes(shapes, judge.model.category)):
+    for number, item in enumerate(scans.meshes(shapes, scorer.model.category)):
         if number % every:
             continue
         rng = np.random.default_rng([zlib.crc32(item.name.encode()), scans.KINDS[VIEWS]])
         pose = scans.random_pose(rng)
         scan = scans.look(item, VIEWS, pose, rng)
         assert scan is not None
-        found = bring_in(judge, scan.cloud, scans.UP)
+        found = clean_and_align(scorer, scan.cloud, scans.UP)
         right = scans.pose_error(found, pose)[0] < 5
         what = f"scans of {VIEWS}, aligned" + ("" if right else " wrongly")
         yield _figure(what, item.name, right, found.kind)

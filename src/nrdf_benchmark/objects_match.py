@@ -19,8 +19,8 @@ from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
+from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
 from nrdf.scans.pose_scorer import PoseScorer
-from nrdf.scans.target import AlignedScan, bring_in
 from nrdf_benchmark.learned import FieldMatch
 from nrdf_benchmark.methods import METHODS, MethodSpec, build_method
 from nrdf_benchmark.objects import LabelledMesh, Labels, list_objects, read_labels, read_object
@@ -127,7 +127,7 @@ class Finder:
         return nrdf.load_model(str(self.settings.model), self.settings.device)
 
     @cached_property
-    def judge(self) -> PoseScorer:
+    def scorer(self) -> PoseScorer:
         return PoseScorer(self.model)
 
     def regions(self, key: str) -> dict[str, np.ndarray]:
@@ -197,7 +197,7 @@ class Finder:
             return Seen(labelled, embedded, PointCloud(embedded.points, embedded.normals))
         labelled = scan_object(self.mesh(key), views)
         start = time.perf_counter()
-        aligned = bring_in(self.judge, labelled.cloud, UP)
+        aligned = clean_and_align(self.scorer, labelled.cloud, UP)
         seconds = time.perf_counter() - start
         degrees, scale = pose_error(aligned, labelled.pose)
         sure, embedded = self._listed[key].forward_sure, aligned.encode()

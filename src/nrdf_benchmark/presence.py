@@ -100,10 +100,10 @@ def examples_of_objects(
     return found
 
 
-def examples_of_members(judge: PoseScorer, pair: int) -> list[Example]:
+def examples_of_members(scorer: PoseScorer, pair: int) -> list[Example]:
     """Every region of one family member, sought on another, whole and in scans."""
-    category = judge.model.category
-    figures = score_regions(judge, category, pair, FIRST_SEED, drop_absent=False)
+    category = scorer.model.category
+    figures = score_regions(scorer, category, pair, FIRST_SEED, drop_absent=False)
     names = f"{category} {2 * pair}", f"{category} {2 * pair + 1}"
     return [
         Example(

@@ -25,9 +25,9 @@ from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.regions.match import Match
 from nrdf.regions.presence import ABSENT
 from nrdf.regions.reference import EncodedReference
+from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.simulate import ScanSettings, SimulatedScan, simulate_scan
-from nrdf.scans.target import AlignedScan, bring_in
 from nrdf.shapes.families import Family, get_family
 from nrdf.shapes.families.tessellation import Tessellation, tessellate
 from nrdf_benchmark.metrics import MISSED, chamfer_l1
@@ -146,14 +146,14 @@ def look(item: Item, kind: str, pose: Similarity, rng: np.random.Generator) -> S
     return simulate_scan(item.vertices, item.faces, settings, rng, pose)
 
 
-def score_pose(judge: PoseScorer, item: Item, kind: str) -> PoseFigure:
+def score_pose(scorer: PoseScorer, item: Item, kind: str) -> PoseFigure:
     """Scan an item, align it, and compare with the truth; its own random numbers."""
     rng = np.random.default_rng([zlib.crc32(item.name.encode()), KINDS[kind]])
     pose = random_pose(rng)
     scan = look(item, kind, pose, rng)
     cloud = PointCloud(pose.to_scan(item.points)) if scan is None else scan.cloud
     start, processor = time.perf_counter(), time.process_time()
-    found = bring_in(judge, cloud, UP)
+    found = clean_and_align(scorer, cloud, UP)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
     yaw, scale = pose_error(found, pose)
     return PoseFigure(
@@ -175,7 +175,7 @@ def pose_error(found: AlignedScan, true: Similarity) -> tuple[float, float]:
 
 
 def score_regions(
-    judge: PoseScorer,
+    scorer: PoseScorer,
     category: str,
     pair: int,
     first_seed: int = FIRST_SEED,
@@ -200,8 +200,8 @@ def score_regions(
     exists = target.locate(taught_on.coordinates).exists
     shared = {r for r, mask in regions.items() if exists[mask].mean() >= SHARED}
     regions = {r: mask for r, mask in regions.items() if r in shared or share[r] == 0}
-    encoded = judge.model.encode(PointCloud(taught_on.points, taught_on.normals))
-    taught = EncodedReference(judge.model, encoded)
+    encoded = scorer.model.encode(PointCloud(taught_on.points, taught_on.normals))
+    taught = EncodedReference(scorer.model, encoded)
     matches = taught.retrieve_all(regions, PointCloud(surface.points), drop_absent=drop_absent)
     figures = _compare("canonical", pair, matches, surface.points, true, share)
     for kind in KINDS:
@@ -212,7 +212,7 @@ def score_regions(
         else:
             cloud, shape = scan.cloud, pose.to_canonical(scan.cloud.points)
             seen = _labels(family, mesh, scan)
-        found = bring_in(judge, cloud, UP)
+        found = clean_and_align(scorer, cloud, UP)
         matches = taught.retrieve_all(regions, found.encode(), drop_absent=drop_absent)
         matches = {name: match.in_scan(found) for name, match in matches.items()}
         figures += _compare(kind, pair, matches, shape, seen, share)
@@ -302,7 +302,7 @@ def summary(
 
 
 def evaluate_scans(
-    judge: PoseScorer,
+    scorer: PoseScorer,
     items: Callable[[], Iterator[Item]],
     count: int,
     pairs: int,
@@ -313,9 +313,9 @@ def evaluate_scans(
     poses: list[PoseFigure] = []
     regions: list[RegionFigure] = []
     for item in items():
-        poses += [score_pose(judge, item, kind) for kind in KINDS]
+        poses += [score_pose(scorer, item, kind) for kind in KINDS]
         progress(done := done + 1, total)
     for pair in range(pairs):
-        regions += score_regions(judge, judge.model.category, pair)
+        regions += score_regions(scorer, scorer.model.category, pair)
         progress(done := done + 1, total)
     return poses, regions

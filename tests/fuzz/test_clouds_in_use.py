@@ -15,8 +15,8 @@ from builders.tiny_field import TinyField
 from nrdf.io.cloud import PointCloud
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.regions.model import Model
+from nrdf.scans.aligned_scan import align
 from nrdf.scans.clean import clean_scan
-from nrdf.scans.target import align
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 SENSORS = (None, [0, 0, 0], [3, 0, 0], [1e4, 0, 0], [1e30, 0, 0], [np.nan, 0, 0], [np.inf, 0, 0])

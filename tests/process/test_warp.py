@@ -11,7 +11,7 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf.process.correspondence import Correspondence, ReferenceSurface
 from nrdf.process.taught_paths import surface_under
 from nrdf.process.warp import warp_segments
-from nrdf.regions.match import Mapped
+from nrdf.regions.match import MappedPoints
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions
 from nrdf.toolpath.types import Segment
@@ -32,9 +32,9 @@ def taught_on(model, reference, scale):
     def places(points, normals, target):
         there = target.canonical(points * scale)
         count = len(points)
-        return Mapped(there, normals, np.ones(count), np.zeros(count), np.zeros((count, 3)))
+        return MappedPoints(there, normals, np.ones(count), np.zeros(count), np.zeros((count, 3)))
 
-    taught.map_places = places
+    taught.map_surface_points = places
     taught.map_points = lambda at, target: places(
         reference.points[at], reference.normals[at], target
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builders.solids import box
-from nrdf.regions.association import snap, voters
+from nrdf.regions.association import nearest_voters, snap
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_snap_is_the_nearest_target_point(clouds, weight):
 
 @pytest.mark.parametrize(("weight", "count"), [(0.1, 7), (0.5, 1), (0.0, 3)])
 def test_voters_are_the_nearest_mapped_points(clouds, weight, count):
-    index, distance = voters(*clouds, weight, count)
+    index, distance = nearest_voters(*clouds, weight, count)
     assert index.shape == distance.shape == (220, count)
     expected = np.sort(all_distances(*clouds, weight).T, axis=1)[:, :count]
     np.testing.assert_allclose(distance, expected, atol=1e-12)
@@ -44,7 +44,7 @@ def test_voters_are_the_nearest_mapped_points(clouds, weight, count):
 
 def test_no_more_voters_than_there_are(clouds):
     mapped, mapped_normals, target, target_normals = clouds
-    index, distance = voters(mapped[:4], mapped_normals[:4], target, target_normals, 0.1, 7)
+    index, distance = nearest_voters(mapped[:4], mapped_normals[:4], target, target_normals, 0.1, 7)
     assert index.shape == (220, 4) and np.isfinite(distance).all()
     assert (np.sort(index, axis=1) == np.arange(4)).all()
 
@@ -57,7 +57,7 @@ def test_normals_tell_the_two_sides_of_a_thin_plate_apart():
 
     def agreement(weight):
         index, _ = snap(plate, normals, other, other_normals, weight)
-        asked, _ = voters(plate, normals, other, other_normals, weight, 5)
+        asked, _ = nearest_voters(plate, normals, other, other_normals, weight, 5)
         snapped = (other_normals[index] == normals).all(1)[faces]
         voted = (normals[asked] == other_normals[:, None]).all(2)[other_faces]
         return snapped.mean(), voted.mean()

@@ -22,7 +22,7 @@ from nrdf.commands.console import (
 if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
     from nrdf.regions.model import Model
-    from nrdf.scans.target import AlignedScan
+    from nrdf.scans.aligned_scan import AlignedScan
     from nrdf.viz.picture import Panel
 
 log = logging.getLogger(__name__)
@@ -100,7 +100,7 @@ def align(
         write_report(folder, report)
     show_alignment(found)
     console.print(f"results, report and picture in {out}")
-    return 3 if strict and found.doubts else 0
+    return 3 if strict and found.warnings else 0
 
 
 def read_scan(
@@ -143,7 +143,7 @@ def warn_of_doubts(found: AlignedScan, path: Path) -> None:
     """Log every doubt about a scan as a warning, and a guess of its unit."""
     if found.unit.origin == "guessed":
         log.info("%s: the unit is guessed to be %s", path, found.unit.name)
-    warn_of(found.doubts, path)
+    warn_of(found.warnings, path)
 
 
 def warn_of(doubts: Sequence[str], path: Path) -> None:
@@ -164,9 +164,9 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "probability": round(best.probability, 4),
         "cost": round(best.cost, 4),
         "field_cost": round(best.field_cost, 4),
-        "usual_cost": round(found.judge.usual_cost, 4),
+        "usual_cost": round(found.scorer.usual_cost, 4),
         "kind": found.kind.describe(),
-        "doubts": found.doubts,
+        "doubts": found.warnings,
         "unit": {"name": unit.name, "origin": unit.origin},
         "sensors": None if sensors is None else sensors,
         "candidates": [

@@ -54,8 +54,8 @@ def gather() -> dict[str, Any]:
     """Versions, devices and models as plain values."""
     import torch
 
-    from nrdf.field.kind import KIND_ZOO
-    from nrdf.field.yaw import YAW_ZOO
+    from nrdf.field.kind_network import KIND_ZOO
+    from nrdf.field.yaw_network import YAW_ZOO
     from nrdf.field.zoo import list_models
 
     devices = {"cpu": f"{torch.get_num_threads()} threads"}

@@ -40,7 +40,7 @@ def kind(
         overwrite: Start anew in a folder that holds another run.
     """
     from nrdf.field.weights import read_metadata
-    from nrdf.training.kind import KindSettings, train_kind
+    from nrdf.training.kind_network import KindSettings, train_kind
 
     settings = KindSettings(steps=steps, seed=seed)
     with progress_bar("steps") as progress:

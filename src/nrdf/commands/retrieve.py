@@ -116,7 +116,7 @@ def retrieve(
             examples = stand_ins(loaded, reference_cloud)
             scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
             warn_of_doubts(scan, target)
-            target_cloud, doubts = scan.scan, scan.doubts
+            target_cloud, doubts = scan.scan, scan.warnings
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         taught = loaded.set_reference(reference_cloud)

@@ -163,9 +163,9 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     from nrdf.geometry.mesh import Mesh
     from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
     from nrdf.io.cloud import write_cloud
+    from nrdf.scans.aligned_scan import clean_and_align
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf.scans.simulate import ScanSettings, simulate_scan
-    from nrdf.scans.target import bring_in
 
     mesh = bundled_mesh()
     turn = upright(up_axis("z")) @ about_up(SCAN_YAW)
@@ -174,11 +174,11 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     rng = np.random.default_rng(0)
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
-    aligned = bring_in(PoseScorer(teacher.model), scan.cloud)
+    aligned = clean_and_align(PoseScorer(teacher.model), scan.cloud)
     seen = aligned.encode_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
-    return teacher.transfer(seen, target_warnings=aligned.doubts, kind=aligned.kind)
+    return teacher.transfer(seen, target_warnings=aligned.warnings, kind=aligned.kind)
 
 
 def _simulate(folder: Path) -> dict[str, Any] | None:

@@ -17,7 +17,7 @@ _NAME_WIDTH = 12  # characters
 if TYPE_CHECKING:
     from nrdf.field.encoded_cloud import EncodedCloud
     from nrdf.io.cloud import PointCloud
-    from nrdf.scans.target import AlignedScan
+    from nrdf.scans.aligned_scan import AlignedScan
 
 
 def transfer(
@@ -126,7 +126,7 @@ def transfer(
                 examples = stand_ins(loaded, lesson.cloud)
                 scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
             known, guessed = _scan_unit(scan, target)
-            doubts = [*guessed, *scan.doubts]
+            doubts = [*guessed, *scan.warnings]
         with errors.status("reference"):
             teacher = ProcessTransfer(lesson, loaded)
         marked = _marked(region, known)

@@ -34,7 +34,7 @@ def yaw(
         overwrite: Start anew in a folder that holds another run.
     """
     from nrdf.field.weights import read_metadata
-    from nrdf.training.yaw import YawSettings, train_yaw
+    from nrdf.training.yaw_network import YawSettings, train_yaw
 
     with progress_bar("steps") as progress:
         settings = YawSettings(steps=steps, seed=seed)

@@ -12,7 +12,7 @@ import torch
 
 from nrdf.field.base import Field
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
-from nrdf.field.kind import KindNetwork, find_kind
+from nrdf.field.kind_network import KindNetwork, find_kind_network
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
@@ -53,7 +53,7 @@ class CloudEncoder:
     def kind_network(self) -> KindNetwork | None:
         """What tells objects of the category from others, and how they are turned; None without
         one in the zoo."""
-        return find_kind(self.category)
+        return find_kind_network(self.category)
 
     def __repr__(self) -> str:
         name, device = type(self).__name__, self.device

@@ -31,11 +31,9 @@ _LARGEST_INDEX = 10_000_000  # bytes
 LARGEST = 8_000_000
 """Bytes that a weight file in the zoo may have."""
 YAW = "yaw"
-"""Preset of what tells yaw (`nrdf.field.yaw`): no field, so it has a folder and an index below."""
+"""Preset of what tells yaw (`nrdf.field.yaw_network`): no field, so it has a folder of its own."""
 KIND = "kind"
-"""Preset of what tells the kind of object (`nrdf.field.kind`), likewise."""
-KIND = "kind"
-"""Preset of what tells the kind of object (`nrdf.field.kind`), likewise."""
+"""Preset of what tells the kind of object (`nrdf.field.kind_network`), likewise."""
 WEIGHTS = "weights.safetensors"
 """What a finished training run calls its weight file."""
 

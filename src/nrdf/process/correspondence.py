@@ -14,7 +14,7 @@ from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.match import Mapped
+from nrdf.regions.match import MappedPoints
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.surface.surface import SAME_SIDE, Surface
@@ -94,11 +94,11 @@ class Correspondence:
     def _mirrored(self) -> EncodedCloud:
         return _mirrored(self.reference.encoded.model, self.target)
 
-    def _mapped(self, points: np.ndarray, normals: np.ndarray) -> Mapped:
+    def _mapped(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
         """The mean of what C says of points (m, 3) of the reference and of their mirror images."""
         encoded, reference = self.reference.encoded, self.reference.encoded.reference
-        one = encoded.map_places(points, normals, self.target)
-        other = self.reference.mirrored.map_places(
+        one = encoded.map_surface_points(points, normals, self.target)
+        other = self.reference.mirrored.map_surface_points(
             LEFT_FOR_RIGHT * reference.canonical(points),
             LEFT_FOR_RIGHT * reference.canonical_normals(normals),
             self._mirrored,

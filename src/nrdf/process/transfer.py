@@ -49,7 +49,7 @@ from nrdf.process.warp import longest_step, warp_segments
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
-from nrdf.scans.kind import KindCheck
+from nrdf.scans.kind_check import KindCheck
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.toolpath.metrics import measure
 from nrdf.toolpath.planner import add_approach_retract, plan
@@ -180,7 +180,7 @@ class ProcessTransfer:
     def _encode(self, target: Any, unit: str | None) -> tuple[EncodedCloud, Sequence[str]]:
         """The target encoded, in metres, and what is uncertain about its unit."""
         if isinstance(target, EncodedCloud):
-            return self.reference.facing(self.bound_knowledge.regions, target), ()
+            return self.reference.orient_sheets(self.bound_knowledge.regions, target), ()
         target = as_cloud(target, "the target")
         category = self.bound_knowledge.knowledge.category
         known, warnings = unit_and_warnings(target, unit, category, "the target", "unit")

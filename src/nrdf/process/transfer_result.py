@@ -9,7 +9,7 @@ from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process, TransferMode
 from nrdf.regions.match import Match
-from nrdf.scans.kind import KindCheck
+from nrdf.scans.kind_check import KindCheck
 from nrdf.toolpath.metrics import Measures
 from nrdf.toolpath.types import ToolPath
 

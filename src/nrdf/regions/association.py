@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 
-VOTERS = 7
-"""Mapped reference points that each target point asks."""
+VOTING_NEIGHBOURS = 7
+"""Reference points on the target that vote on each target point (k-nearest voting)."""
 
 
 # Trees are asked by one thread: an interrupt would free the arrays under scipy's other threads.
@@ -31,17 +31,18 @@ def snap(
     return index, distance
 
 
-def voters(
+def nearest_voters(
     mapped: np.ndarray,
     mapped_normals: np.ndarray,
     target: np.ndarray,
     target_normals: np.ndarray,
     normal_weight: float = NORMAL_WEIGHT,
-    count: int = VOTERS,
+    count: int = VOTING_NEIGHBOURS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """For each target point, the mapped reference points nearest in (position, normal).
+    """The mapped reference points that vote on each target point: nearest in position and normal.
 
-    Returns their indices (n, count) into `mapped` and distances (n, count).
+    mapped (m, 3), target (n, 3) canonical, with their normals. Returns the voters' indices
+    (n, count) into `mapped` and distances (n, count).
     """
     tree = cKDTree(oriented_features(mapped, mapped_normals, normal_weight))
     distance, index = tree.query(

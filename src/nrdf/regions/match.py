@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.field.base import Inverse
 from nrdf.regions.presence import Presence
-from nrdf.scans.target import AlignedScan
+from nrdf.scans.aligned_scan import AlignedScan
 
 TRUST_SCALE = 0.2
 """Canonical distance at which trust has fallen to 1/e: from a target point to the mapped reference,
@@ -57,7 +57,7 @@ class Match:
         )
 
 
-class Mapped(NamedTuple):
+class MappedPoints(NamedTuple):
     """Reference points on a target, canonical: points (m, 3), normals (m, 3), existence (m,) in
     [0, 1] (does the target have such a place?), error (m,) that the field expects; 1 and 0 for a
     field that says nothing of the kind. moved: (m, 3), how far refinement has moved the points."""
@@ -68,7 +68,7 @@ class Mapped(NamedTuple):
     error: np.ndarray
     moved: np.ndarray
 
-    def shifted(self, moved: np.ndarray) -> Mapped:
+    def shifted(self, moved: np.ndarray) -> MappedPoints:
         """The same, moved by (m, 3)."""
         return self._replace(points=self.points + moved, moved=self.moved + moved)
 
@@ -77,16 +77,16 @@ class Mapped(NamedTuple):
         """(m,) in [0, 1]: that the place exists, and how small an error is expected."""
         return self.existence * np.exp(-self.error / TRUST_SCALE)
 
-    def select(self, chosen: np.ndarray) -> Mapped:
+    def select(self, chosen: np.ndarray) -> MappedPoints:
         """The points at `chosen`, integers (k,) or a mask (m,)."""
-        return Mapped(*(values[chosen] for values in self))
+        return MappedPoints(*(values[chosen] for values in self))
 
 
-def mapped_points(inverse: Inverse, normals: np.ndarray) -> Mapped:
+def mapped_points(inverse: Inverse, normals: np.ndarray) -> MappedPoints:
     """What C says of one target's points, with what it leaves open: the `normals` (m, 3) that the
     points had on the reference, existence certain, no error."""
     count = len(normals)
-    return Mapped(
+    return MappedPoints(
         inverse.points[0].cpu().numpy(),
         normals if inverse.normals is None else inverse.normals[0].cpu().numpy(),
         np.ones(count, np.float32)

@@ -16,13 +16,13 @@ from nrdf.errors import RegionError, unknown_name
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
 from nrdf.io.inputs import as_cloud
-from nrdf.regions.association import VOTERS, snap, voters
-from nrdf.regions.match import TRUST_SCALE, Mapped, Match, mapped_points
+from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
+from nrdf.regions.match import TRUST_SCALE, MappedPoints, Match, mapped_points
 from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
-from nrdf.scans.kind import KindCheck, check_kind
+from nrdf.scans.kind_check import KindCheck, check_kind
 from nrdf.scans.pose_scorer import PoseScorer
 
 log = logging.getLogger(__name__)
@@ -43,10 +43,10 @@ class EncodedReference:
     def check_kind(self, target: EncodedCloud) -> KindCheck:
         """Whether a target looks like an object of the category, upright and facing forward in the
         pose that it is encoded in; without a network that tells, like the reference."""
-        return check_kind(self.model, target, lambda: self._judge)
+        return check_kind(self.model, target, lambda: self._scorer)
 
     @cached_property
-    def _judge(self) -> PoseScorer:
+    def _scorer(self) -> PoseScorer:
         return PoseScorer(self.model, [self.reference.cloud])
 
     @cached_property
@@ -81,8 +81,8 @@ class EncodedReference:
         reference points nearest in position and normal; parts of the target that are far from all
         of them, by the error that the field expects, join a region only where they grow out of it
         (`nrdf.regions.patches`). "points" snaps C's prediction of each
-        region point to the target (paper, eq. 9). A region of fewer than half of `VOTERS` points
-        gets no majority anywhere: use "points" for spots.
+        region point to the target (paper, eq. 9). A region of fewer than half of
+        `VOTING_NEIGHBOURS` points gets no majority anywhere: use "points" for spots.
         refine: move the mapped reference onto the target in a few steps of smooth registration
         (`nrdf.regions.refine`), about half a second a target.
         drop_absent: a region that the target surely lacks, or that was not seen, comes back empty;
@@ -115,9 +115,11 @@ class EncodedReference:
             }
         # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
         off = encoded.distance(surface.points - surface.moved, surface.normals)
-        asked = self._returned(encoded)
+        asked = self._map_back(encoded)
         matches = {
-            name: self._judged(match, chosen[name], encoded, surface, off, asked, drop_absent)
+            name: self._with_presence(
+                match, chosen[name], encoded, surface, off, asked, drop_absent
+            )
             for name, match in matches.items()
         }
         encoded.seconds["associate"] = time.perf_counter() - start
@@ -126,7 +128,7 @@ class EncodedReference:
     def _encode(self, target: Any) -> EncodedCloud:
         return self.model.encode(as_cloud(target, "the target"))
 
-    def map_surface(self, target: EncodedCloud, refine: bool = False) -> Mapped:
+    def map_surface(self, target: EncodedCloud, refine: bool = False) -> MappedPoints:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
         start = time.perf_counter()
         mapped = self._invert(target, self._k, self.reference.normals)
@@ -141,8 +143,8 @@ class EncodedReference:
         return mapped
 
     def map_points(
-        self, indices: np.ndarray, target: EncodedCloud, surface: Mapped | None = None
-    ) -> Mapped:
+        self, indices: np.ndarray, target: EncodedCloud, surface: MappedPoints | None = None
+    ) -> MappedPoints:
         """Where reference points given by their indices (m,) in the cloud arrive on a target.
 
         surface: what `map_surface` gave for the target, to follow it where it has been refined.
@@ -160,7 +162,9 @@ class EncodedReference:
         mapped = self._invert(target, self._describe(points, normals), normals)
         return mapped if surface is None else mapped.shifted(surface.moved[nearest])
 
-    def map_places(self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud) -> Mapped:
+    def map_surface_points(
+        self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud
+    ) -> MappedPoints:
         """Where any places of the reference's surface arrive on a target.
 
         points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
@@ -169,7 +173,7 @@ class EncodedReference:
         normals = self.reference.canonical_normals(normals)
         return self._invert(target, self._describe(points, normals), normals)
 
-    def described(self, target: EncodedCloud) -> np.ndarray:
+    def correspondence_features(self, target: EncodedCloud) -> np.ndarray:
         """What the descriptors of a target's, or the reference's, working points (n, 6) say: what
         is alike is near.
 
@@ -181,7 +185,9 @@ class EncodedReference:
         landed = self._invert(self.reference, k, target.normals)
         return oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
 
-    def facing(self, regions: Mapping[str, np.ndarray], target: EncodedCloud) -> EncodedCloud:
+    def orient_sheets(
+        self, regions: Mapping[str, np.ndarray], target: EncodedCloud
+    ) -> EncodedCloud:
         """The target with its sheets turned to the side that the regions are on.
 
         regions: name to mask (n,) or indices (m,) on the reference. Only points whose side nothing
@@ -192,8 +198,13 @@ class EncodedReference:
         if len(both.working) == count:
             return target
         mapped = self.map_surface(target)
-        asked, _ = voters(
-            mapped.points, mapped.normals, both.points, both.normals, NORMAL_WEIGHT, VOTERS
+        asked, _ = nearest_voters(
+            mapped.points,
+            mapped.normals,
+            both.points,
+            both.normals,
+            NORMAL_WEIGHT,
+            VOTING_NEIGHBOURS,
         )
         wanted = np.any([self._working_mask(indices) for indices in regions.values()], axis=0)
         claim = wanted[asked].mean(axis=1)
@@ -203,12 +214,12 @@ class EncodedReference:
         normals[turned] *= -1
         return replace(target, normals=normals)
 
-    def _judged(
+    def _with_presence(
         self,
         match: Match,
         indices: np.ndarray,
         target: EncodedCloud,
-        surface: Mapped,
+        surface: MappedPoints,
         off: np.ndarray,
         returned: tuple[np.ndarray, np.ndarray],
         drop_absent: bool,
@@ -230,20 +241,25 @@ class EncodedReference:
         )
         return match.with_presence(find_presence(evidence, off[inside], off), drop_absent)
 
-    def _returned(self, target: EncodedCloud) -> tuple[np.ndarray, np.ndarray]:
+    def _map_back(self, target: EncodedCloud) -> tuple[np.ndarray, np.ndarray]:
         """Where a target's points lead back to: positions (m,) of some of its working points, and
         the reference's working points (m, k) nearest to C(z_reference, θ(z_target, x))."""
         chosen = np.random.default_rng(0).permutation(len(target.points))[:_RETURNED]
         points, normals = target.points[chosen], target.normals[chosen]
         k = self._describe(points, normals, target.z)
         landed = self._invert(self.reference, k, normals)
-        return chosen, self.reference.nearest(landed.points, landed.normals, VOTERS)
+        return chosen, self.reference.nearest(landed.points, landed.normals, VOTING_NEIGHBOURS)
 
     def _by_mask(
-        self, chosen: dict[str, np.ndarray], target: EncodedCloud, mapped: Mapped
+        self, chosen: dict[str, np.ndarray], target: EncodedCloud, mapped: MappedPoints
     ) -> dict[str, Match]:
-        asked, distance = voters(
-            mapped.points, mapped.normals, target.points, target.normals, NORMAL_WEIGHT, VOTERS
+        asked, distance = nearest_voters(
+            mapped.points,
+            mapped.normals,
+            target.points,
+            target.normals,
+            NORMAL_WEIGHT,
+            VOTING_NEIGHBOURS,
         )
         trust = mapped.trust[asked] * np.exp(-distance / TRUST_SCALE)
         patches = find_patches(target.points, explained_by(distance, mapped.error[asked]))
@@ -266,7 +282,7 @@ class EncodedReference:
             )
         return matches
 
-    def _by_points(self, mapped: Mapped, target: EncodedCloud) -> Match:
+    def _by_points(self, mapped: MappedPoints, target: EncodedCloud) -> Match:
         nearest, distance = snap(mapped.points, mapped.normals, target.points, target.normals)
         found, first = np.unique(target.working[nearest], return_index=True)
         trust = mapped.trust * np.exp(-distance / TRUST_SCALE)
@@ -307,10 +323,10 @@ class EncodedReference:
                 )
         return torch.cat(parts, dim=1)
 
-    def _invert(self, target: EncodedCloud, k: torch.Tensor, normals: np.ndarray) -> Mapped:
+    def _invert(self, target: EncodedCloud, k: torch.Tensor, normals: np.ndarray) -> MappedPoints:
         parts = []
         with torch.inference_mode():
             for start in range(0, k.shape[1], _CHUNK):
                 inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
                 parts.append(mapped_points(inverse, normals[start : start + _CHUNK]))
-        return Mapped(*map(np.concatenate, zip(*parts, strict=True)))
+        return MappedPoints(*map(np.concatenate, zip(*parts, strict=True)))

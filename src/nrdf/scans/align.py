@@ -1,8 +1,8 @@
 """Bringing a scan into its category's frame: yaw, scale and centre, and what else it might be.
 
-Yaws over the full circle are judged by the field (`nrdf.scans.pose_scorer`) and by a network that
-tells which way an object faces (`nrdf.field.yaw`); the best are refined by the object's own mirror
-plane (`nrdf.scans.mirror`) and judged again, front and back exchanged too.
+Yaws over the full circle are scored by the field (`nrdf.scans.pose_scorer`) and by a network that
+tells which way an object faces (`nrdf.field.yaw_network`). The best are refined by the object's own
+mirror plane (`nrdf.scans.mirror`) and scored again, front and back exchanged too.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
-from nrdf.field.yaw import at_yaws
+from nrdf.field.yaw_network import log_probability_at
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
@@ -23,9 +23,9 @@ from nrdf.scans.mirror import MirrorPlane, mirror_plane
 from nrdf.scans.pose_scorer import PoseScorer, sparse_subset
 
 WORKING_POINTS = 8192
-_COARSE_POINTS, _FINE_POINTS = 512, 1024  # that are judged by
+_COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
-_REFINED = 4  # of them that are refined, by the field's judgement alone
+_REFINED = 4  # of them that are refined, by the field's score alone
 _REFINED_FACING = 3, 2  # by the field's, and by the network's where there is one
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
@@ -124,8 +124,8 @@ class _Hypothesis:
         return _Hypothesis(self.up, self.yaw + np.pi, plane)
 
 
-def align_scan(judge: PoseScorer, scan: PointCloud, up: np.ndarray | None = None) -> Alignment:
-    """Poses in which `scan`, a cleaned one of one object, is an object of the judge's category.
+def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = None) -> Alignment:
+    """Poses in which `scan`, a cleaned one of one object, is an object of the scorer's category.
 
     up: (3,) unit, in the scan's frame; the six axes are tried unless given. Raises CloudError for a
     cloud that is empty, flat, or has too few points.
@@ -145,20 +145,20 @@ def align_scan(judge: PoseScorer, scan: PointCloud, up: np.ndarray | None = None
     yaws = 2 * np.pi / _YAWS * np.arange(_YAWS)
     tried = [_Hypothesis(axis, yaw) for axis in ups for yaw in yaws]
     chosen = sparse_subset(working.points, _COARSE_POINTS)
-    costs: np.ndarray = judge.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
+    costs: np.ndarray = scorer.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
-    facing = _facing(judge, working, ups)
+    facing = _facing(scorer, working, ups)
     best = _minima(costs, _REFINED)
-    if judge.yaw is not None:
-        against = -np.array([at_yaws(row, yaws) for row in facing])
-        by_field, by_network = _REFINED_FACING
-        best = np.unique([*best[:by_field], *_minima(against, by_network)])
+    if scorer.yaw is not None:
+        against = -np.array([log_probability_at(row, yaws) for row in facing])
+        by_field, check_by_network = _REFINED_FACING
+        best = np.unique([*best[:by_field], *_minima(against, check_by_network)])
     lap("facing")
     refined = [found for index in best for found in _refine(working, tried[index])]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
-    field_costs = judge.fine(points, normals, *_completed(points, normals, refined))
+    field_costs = scorer.fine(points, normals, *_completed(points, normals, refined))
     costs = field_costs + _FACING_COST * _against(facing, ups, refined)
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
@@ -170,7 +170,7 @@ def align_scan(judge: PoseScorer, scan: PointCloud, up: np.ndarray | None = None
             cost, alone = float(costs[index]), float(field_costs[index])
             candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
     lap("fine")
-    scale = _COST_SCALE if judge.yaw is None else _COST_SCALE_FACING
+    scale = _COST_SCALE if scorer.yaw is None else _COST_SCALE_FACING
     weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / scale)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
@@ -196,21 +196,23 @@ def _posed(
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
 
 
-def _facing(judge: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
+def _facing(scorer: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
     """Log probabilities (ups, bins) of the yaws about each up; all alike without a network."""
-    if judge.yaw is None:
+    if scorer.yaw is None:
         return np.zeros((len(ups), _YAWS))
     order = np.random.default_rng(0).permutation(len(working.points))
     points, normals = working.points[order], working.normals[order]
     turns = [upright(up) for up in ups]
-    return np.array([judge.yaw.log_probability(points @ t, normals @ t) for t in turns])
+    return np.array([scorer.yaw.log_probability(points @ t, normals @ t) for t in turns])
 
 
 def _against(facing: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]) -> np.ndarray:
     """What the network says against each hypothesis (h,): how much less likely, in logarithms, up
     to what makes it sure."""
     places = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
-    told = [at_yaws(facing[i], found.yaw) for i, found in zip(places, refined, strict=True)]
+    told = [
+        log_probability_at(facing[i], found.yaw) for i, found in zip(places, refined, strict=True)
+    ]
     return np.minimum(-np.array(told), _MOST_AGAINST)
 
 

@@ -19,7 +19,7 @@ from nrdf.errors import ModelError
 from nrdf.field.base import Inverse
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, encoder_subset
-from nrdf.field.yaw import YawNetwork, find_yaw
+from nrdf.field.yaw_network import YawNetwork, find_yaw_network
 from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.families import FAMILY_NAMES, get_family
@@ -54,7 +54,7 @@ class PoseScorer:
         Raises ModelError if there are none and the category has no family.
         """
         self.model = model
-        self.yaw = yaw or find_yaw(model.category)
+        self.yaw = yaw or find_yaw_network(model.category)
         given = list(prototypes) or family_prototypes(model.category)
         self.prototypes = len(given)
         self._clouds = [model.encode(cloud) for cloud in given]
@@ -84,7 +84,7 @@ class PoseScorer:
     def fine(
         self, points: np.ndarray, normals: np.ndarray, whole: np.ndarray, whole_normals: np.ndarray
     ) -> np.ndarray:
-        """Cost (h,) as of `coarse`, more exactly, with what the field doubts.
+        """Cost (h,) as of `coarse`, more exactly, with the errors that the field expects.
 
         whole, whole_normals: (h, m, 3) what is embedded: the cloud, completed by its mirror image
         where it has one. Added are the error that the field expects of itself on the prototypes,
@@ -105,7 +105,7 @@ class PoseScorer:
             costs.append(np.delete(each, number).mean() if self.prototypes > 1 else each.mean())
         return float(np.mean(costs))
 
-    def strangeness(self, points: np.ndarray) -> float:
+    def proportion_z_score(self, points: np.ndarray) -> float:
         """How far the proportions of a canonical cloud (n, 3) are from the prototypes', in standard
         deviations (root mean square over the axes)."""
         known = np.array([_proportions(cloud.points) for cloud in self._clouds])

@@ -45,14 +45,14 @@ def kind(
     """
     import nrdf
     from nrdf.errors import DataError
-    from nrdf.field.kind import load_kind
+    from nrdf.field.kind_network import load_kind_network
     from nrdf.io.atomic import write_json
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import kind as benchmark
 
     if scans_every and shapes is None:
         raise DataError("--scans-every scans meshes: give their folder as --shapes")
-    asked, metadata = load_kind(network or category)
+    asked, metadata = load_kind_network(network or category)
     right = list(benchmark.real_objects(category, shapes, bsrc, labelled))
     foreign = [] if others is None else benchmark.other_objects(others, category, count)
     with progress_bar("objects") as progress:

@@ -66,14 +66,14 @@ def presence(
                 every += kept(out, name, partial(examples_of_objects, finder, key, other))
                 progress(done, len(chosen))
     for name in category:
-        judge = None
+        scorer = None
         with progress_bar(f"pairs of {name}s") as progress:
             for done, pair in enumerate(choose_pairs(name, pairs), 1):
 
                 def collect(name: str = name, pair: int = pair) -> list[Example]:
-                    nonlocal judge
-                    judge = judge or _judge(name, device)
-                    return examples_of_members(judge, pair)
+                    nonlocal scorer
+                    scorer = scorer or _scorer(name, device)
+                    return examples_of_members(scorer, pair)
 
                 every += kept(out, f"{name}-{pair:03d}", collect)
                 progress(done, pairs)
@@ -102,7 +102,7 @@ def _finder(folder: Path, model: str, device: str) -> tuple[Finder, list[str]]:
     return Finder(settings), [item.key for item in read_objects(folder, ("chair", "stool"))]
 
 
-def _judge(name: str, device: str) -> PoseScorer:
+def _scorer(name: str, device: str) -> PoseScorer:
     import nrdf
     from nrdf.scans.pose_scorer import PoseScorer
 

@@ -47,13 +47,13 @@ def scans(
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import scans as benchmark
 
-    judge = PoseScorer(nrdf.load_model(model or category, device))
+    scorer = PoseScorer(nrdf.load_model(model or category, device))
     found = (
         [] if meshes is None else list(islice(benchmark.meshes(meshes, category), 0, None, every))
     )
     with progress_bar(f"scans of {category}s") as progress:
         poses, regions = benchmark.evaluate_scans(
-            judge,
+            scorer,
             lambda: chain(benchmark.members(category, members), found),
             members + len(found),
             pairs,

@@ -165,7 +165,7 @@ class LocalComputing:
             place = (self._taught.model.category, reference, file)
             if place not in self._said:
                 seen = taught.reference if file == reference else self._seen(file)
-                self._said[place] = taught.described(seen)
+                self._said[place] = taught.correspondence_features(seen)
             said[key] = self._said[place]
         own = oriented_features(taught.reference.points, taught.reference.normals, NORMAL_WEIGHT)
         return CorrespondenceFeatures(said, own, taught.reference.nearest_working)

@@ -1,8 +1,8 @@
-"""Is this the kind of object, upright, facing forward? Asked once, before any region is looked for.
+"""Check of the kind of object: of the category, upright, facing forward? Before any region.
 
-A network of the category tells (`nrdf.field.kind`). For a category without one it is asked how
-well the field explains the target by what is known of the category (`nrdf.scans.pose_scorer`),
-which says less.
+A network of the category tells (`nrdf.field.kind_network`). A category without one is checked by
+how well the field explains the target from known objects (`nrdf.scans.pose_scorer`), which says
+less.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.field.kind import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
+from nrdf.field.kind_network import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
 from nrdf.geometry.similarity import AXES, up_axis
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.objects import count_objects
 from nrdf.scans.pose_scorer import PoseScorer
 
-LEAST = 0.3
-"""Probability that an object stands upright and faces forward, below which it is doubted."""
-FOREIGN, FOREIGN_TO_ONE = 0.5, 0.55
-"""Cost above the usual one (`nrdf.scans.pose_scorer`) from which, without a network, it is doubted;
-the second where one object is all that is known."""
-STRANGEST, STRANGEST_TO_ONE = 1.65, 3.0
+MINIMUM_PROBABILITY = 0.3
+"""Probability that an object stands upright and faces forward, below which there is a warning."""
+COST_MARGIN, COST_MARGIN_TO_ONE = 0.5, 0.55
+"""Cost above the usual one (`nrdf.scans.pose_scorer`) from which, without a network, there is a
+warning; the second where one object is all that is known."""
+LARGEST_Z_SCORE, LARGEST_Z_SCORE_TO_ONE = 1.65, 3.0
 """Standard deviations of its proportions from the known objects', likewise."""
 _COUNTED = 2048  # points in which objects are counted
 FITS = "upright and facing forward"
@@ -65,16 +65,16 @@ class KindCheck:
 
 
 def check_kind(
-    model: CloudEncoder, target: EncodedCloud, judge: Callable[[], PoseScorer]
+    model: CloudEncoder, target: EncodedCloud, scorer: Callable[[], PoseScorer]
 ) -> KindCheck:
     """Check a target that is encoded in the pose in which its regions are to be found.
 
-    judge: gives what is known of the category; it is asked for only without a network.
+    scorer: gives what is known of the category; it is asked for only without a network.
     """
     network = model.kind_network
     if network is None:
-        judging = judge()
-        return by_judge(judging, judging.cost_of(target), target.points)
+        given = scorer()
+        return check_by_scorer(given, given.cost_of(target), target.points)
     return check_points(network, model.category, target.points, target.pose.rotation)
 
 
@@ -89,7 +89,7 @@ def check_points(
     few = points[np.random.default_rng(0).permutation(len(points))[:_COUNTED]]
     count = count_objects(PointCloud(few), up_axis("y"))
     if count == 1:
-        return by_network(network, category, points, rotation)
+        return check_by_network(network, category, points, rotation)
     warning = (
         f"the target holds {count} objects of comparable size; give a cloud of one {category}, or "
         f"--up {_letter(rotation[:, 1])} to have the largest taken"
@@ -97,7 +97,7 @@ def check_points(
     return KindCheck(category, f"{count} objects", 0.0, (warning,))
 
 
-def by_network(
+def check_by_network(
     network: KindNetwork, category: str, points: np.ndarray, rotation: np.ndarray
 ) -> KindCheck:
     """What a category's network says of the canonical points (n, 3) of one object; rotation: as of
@@ -105,7 +105,7 @@ def by_network(
     order = np.random.default_rng(0).permutation(len(points))
     likely = network.probabilities(points[order])
     sure = float(likely[0])
-    if sure >= LEAST:
+    if sure >= MINIMUM_PROBABILITY:
         return KindCheck(category, FITS, sure)
     answer = int(likely[1:].argmax()) + 1
     # Many answers share what an object of the category may be; together they may outweigh "other".
@@ -142,13 +142,13 @@ def _in_words(answer: int, rotation: np.ndarray) -> str:
 def _warning(category: str, answer: int, looks: str, rotation: np.ndarray) -> str:
     """A sentence that says what is seen, and what to do about it."""
     aligned = not np.allclose(rotation, np.eye(3))
-    unlike = f"the target does not look like a {category}"
+    not_like = f"the target does not look like a {category}"
     if answer == OTHER:
         return (
-            f"{unlike}: it looks like another kind of object, or like a part of one; give a whole "
-            f"{category}, or, if it is one in another pose, --up auto to have it aligned"
+            f"{not_like}: it looks like another kind of object, or like a part of one; give a "
+            f"whole {category}, or, if it is one in another pose, --up auto to have it aligned"
         )
-    standing = f"{unlike} standing upright and facing {_axis(rotation[:, 0])}: it looks like one"
+    standing = f"{not_like} standing upright and facing {_axis(rotation[:, 0])}: it looks like one"
     up = up_of(answer)
     if up is None:
         return f"{standing} that is {looks}; give the direction that points up, as --up x y z"
@@ -169,21 +169,21 @@ def _letter(direction: np.ndarray) -> str:
     return _axis(direction).lstrip("+").lower()
 
 
-def by_judge(judge: PoseScorer, cost: float, points: np.ndarray) -> KindCheck:
-    """What the field makes of canonical points (n, 3), by a few known objects of the category.
+def check_by_scorer(scorer: PoseScorer, cost: float, points: np.ndarray) -> KindCheck:
+    """Check canonical points (n, 3) against a few known objects of the category.
 
-    cost: at which it explains them.
+    cost: at which the field explains the points by those (`PoseScorer.fine`).
     """
-    category, strangeness = judge.model.category or "known object", judge.strangeness(points)
-    foreign, strangest = FOREIGN, STRANGEST
-    if judge.prototypes == 1:
-        foreign, strangest = FOREIGN_TO_ONE, STRANGEST_TO_ONE
-    if cost < judge.usual_cost + foreign and strangeness < strangest:
+    category, z_score = scorer.model.category or "known object", scorer.proportion_z_score(points)
+    cost_margin, largest = COST_MARGIN, LARGEST_Z_SCORE
+    if scorer.prototypes == 1:
+        cost_margin, largest = COST_MARGIN_TO_ONE, LARGEST_Z_SCORE_TO_ONE
+    if cost < scorer.usual_cost + cost_margin and z_score < largest:
         return KindCheck(category, "like what is known of its kind")
     warning = (
         f"the target does not look like a {category} standing upright and facing +X: the field "
-        f"explains it at a cost of {cost:.2f}, {judge.usual_cost:.2f} is usual, and its "
-        f"proportions are {strangeness:.1f} standard deviations off; check that it is one, and "
+        f"explains it at a cost of {cost:.2f}, {scorer.usual_cost:.2f} is usual, and its "
+        f"proportions are {z_score:.1f} standard deviations off; check that it is one, and "
         "give --up with the direction that points up if it is in another pose"
     )
     return KindCheck(category, _SOMETHING_ELSE, None, (warning,))

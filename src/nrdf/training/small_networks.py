@@ -118,7 +118,7 @@ def run_steps(
     network.eval()
 
 
-def write_small(
+def write_small_network(
     out: Path,
     network: Any,
     category: str,

@@ -18,24 +18,24 @@ from nrdf_benchmark import scans
 
 
 @pytest.fixture(scope="module")
-def judge():
+def scorer():
     return PoseScorer(nrdf.load_model("car"))
 
 
-def test_poses_of_an_item_are_scored_the_same_every_time(judge):
+def test_poses_of_an_item_are_scored_the_same_every_time(scorer):
     (item,) = scans.members("car", 1)
-    figures = [scans.score_pose(judge, item, kind) for kind in ("full", "3 views")]
+    figures = [scans.score_pose(scorer, item, kind) for kind in ("full", "3 views")]
     assert [f.kind for f in figures] == ["full", "3 views"]
     for figure in figures:
         assert figure.yaw < 5 and figure.scale < 0.03 and figure.source == "family"
         assert figure.seconds > 0 and figure.processor_seconds > 0
     assert figures[0].points == scans.CLOUD_POINTS < figures[1].points
-    again = scans.score_pose(judge, item, "full")
+    again = scans.score_pose(scorer, item, "full")
     assert (again.yaw, again.scale) == (figures[0].yaw, figures[0].scale)
 
 
-def test_regions_of_a_pair_are_scored_in_every_kind_of_scan(judge):
-    figures = scans.score_regions(judge, "car", 0)
+def test_regions_of_a_pair_are_scored_in_every_kind_of_scan(scorer):
+    figures = scans.score_regions(scorer, "car", 0)
     assert {f.kind for f in figures} == {"canonical", *scans.KINDS}
     there = [f for f in figures if f.state == "there"]
     assert all(np.isnan(f.cd_l1) == (f.state != "there") for f in figures)

@@ -12,10 +12,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.errors import DataError
-from nrdf.field.yaw import YawConfig, YawNetwork, turn
+from nrdf.field.yaw_network import YawConfig, YawNetwork, turn
+from nrdf.training.camera_views import Views, draw_seen, load_views, split
 from nrdf.training.provenance import list_shapes, provenance
-from nrdf.training.scanned import Views, draw_seen, load_views, split
-from nrdf.training.small import Settings, run_steps, small_run, write_small
+from nrdf.training.small_networks import Settings, run_steps, small_run, write_small_network
 
 _SPREAD = 1.0  # of the yaws that count as right, in bins
 
@@ -60,7 +60,7 @@ def train_yaw(
 
         run_steps(network, settings, loss_at, out, progress)
         scores = validate(network, validation, settings)
-        return write_small(out, network, category, settings, provenance(kept), scores)
+        return write_small_network(out, network, category, settings, provenance(kept), scores)
 
 
 def draw(

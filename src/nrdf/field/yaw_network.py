@@ -104,7 +104,7 @@ def turn(yaw: Tensor) -> Tensor:
     return torch.stack([torch.stack(row, -1) for row in rows], -2)
 
 
-def at_yaws(log_probability: np.ndarray, yaws: np.ndarray | float) -> np.ndarray:
+def log_probability_at(log_probability: np.ndarray, yaws: np.ndarray | float) -> np.ndarray:
     """Values (...) of a distribution (bins,) over the circle at `yaws` (...) (rad), interpolated,
     relative to its highest."""
     bins = len(log_probability)
@@ -115,7 +115,7 @@ def at_yaws(log_probability: np.ndarray, yaws: np.ndarray | float) -> np.ndarray
     return (1 - share) * low + share * high - log_probability.max()
 
 
-def load_yaw(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork, dict[str, Any]]:
+def load_yaw_network(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork, dict[str, Any]]:
     """The network of a category in the zoo, or of a weight file, and its metadata.
 
     Raises ModelError for an unknown name, and a file that is damaged or of another kind.
@@ -131,10 +131,10 @@ def load_yaw(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork, dict[st
     return network, metadata
 
 
-def find_yaw(category: str) -> YawNetwork | None:
+def find_yaw_network(category: str) -> YawNetwork | None:
     """The zoo's network of a category, if it has one."""
     known = [entry.name for entry in list_models(YAW_ZOO)]
-    return load_yaw(category)[0] if category in known else None
+    return load_yaw_network(category)[0] if category in known else None
 
 
 def _layer(given: int, wanted: int) -> list[nn.Module]:

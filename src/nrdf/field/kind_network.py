@@ -126,7 +126,7 @@ _SHOWN = [
 _ANSWERED = [_answers(shown) for shown in _SHOWN]
 
 
-def load_kind(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwork, dict[str, Any]]:
+def load_kind_network(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwork, dict[str, Any]]:
     """The network of a category in the zoo, or of a weight file, and its metadata.
 
     Raises ModelError for an unknown name, and a file that is damaged or of another kind.
@@ -144,10 +144,10 @@ def load_kind(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwork, dict
     return network.eval(), metadata
 
 
-def find_kind(category: str) -> KindNetwork | None:
+def find_kind_network(category: str) -> KindNetwork | None:
     """The zoo's network of a category, if it has one."""
     known = [entry.name for entry in list_models(KIND_ZOO)]
-    return load_kind(category)[0] if category in known else None
+    return load_kind_network(category)[0] if category in known else None
 
 
 def _layer(given: int, wanted: int) -> list[nn.Module]:

@@ -13,8 +13,8 @@ import torch
 import nrdf
 from builders.step_shape import step_shape
 from nrdf.errors import DataError, ModelError
-from nrdf.field import kind as kinds
-from nrdf.field.kind import (
+from nrdf.field import kind_network as kinds
+from nrdf.field.kind_network import (
     ANSWERS,
     ASKEW,
     ORIENTATIONS,
@@ -22,21 +22,20 @@ from nrdf.field.kind import (
     TILTED,
     UPS,
     KindNetwork,
-    load_kind,
+    load_kind_network,
     orientation_of,
     up_of,
 )
 from nrdf.field.zoo import add_to_zoo, list_models
 from nrdf.geometry.similarity import about_up, up_axis, upright
 from nrdf.io.cloud import PointCloud
-from nrdf.scans.kind import FITS, LEAST, by_network
-from nrdf.scans.target import align
+from nrdf.scans.aligned_scan import align
+from nrdf.scans.kind_check import FITS, LEAST, check_by_network
 from nrdf.shapes.dataset import IndexRow, write_index, write_shape
 from nrdf.shapes.families import get_family
-from nrdf.training import small
-from nrdf.training.kind import KindSettings, draw, is_held_out, train_kind
+from nrdf.training.camera_views import load_views
+from nrdf.training.kind_network import KindSettings, draw, is_held_out, train_kind
 from nrdf.training.provenance import list_shapes
-from nrdf.training.scanned import load_views
 from nrdf_benchmark import kind as benchmark
 
 TETRAHEDRON = """
@@ -76,7 +75,7 @@ def folders(tmp_path_factory):
 @pytest.fixture(scope="module", autouse=True)
 def few_heaps():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("nrdf.training.kind._BOXES", 6)
+        patch.setattr("nrdf.training.kind_network._BOXES", 6)
         yield
 
 
@@ -105,7 +104,7 @@ class Saying:
 
 def said(answer: int, rotation=None) -> str:
     rotation = np.eye(3) if rotation is None else rotation
-    (warning,) = by_network(Saying(answer), "chair", np.zeros((5, 3)), rotation).warnings
+    (warning,) = check_by_network(Saying(answer), "chair", np.zeros((5, 3)), rotation).warnings
     return warning
 
 
@@ -160,7 +159,7 @@ def test_it_says_what_it_sees_and_what_to_do():
     turned = upright(up_axis("z"))
     assert "upside down; give --up -z" in said(over, turned)
     assert "look at the picture, or scan more sides" in said(quarter, turned)
-    fits = by_network(Saying(0), "chair", np.zeros((5, 3)), np.eye(3))
+    fits = check_by_network(Saying(0), "chair", np.zeros((5, 3)), np.eye(3))
     assert fits.fits and fits.taken_for == FITS and fits.describe()["probability"] == 0.9
 
 
@@ -188,7 +187,7 @@ def test_half_of_the_names_of_others_are_never_shown():
 
 
 def test_training_goes_on_where_it_was_killed(folders, tmp_path, monkeypatch):
-    monkeypatch.setattr(small, "CHECKPOINT_EVERY", 5)
+    monkeypatch.setattr("nrdf.training.small_networks.CHECKPOINT_EVERY", 5)
 
     def kill(done: int, total: int) -> None:
         if done == 8:
@@ -200,13 +199,13 @@ def test_training_goes_on_where_it_was_killed(folders, tmp_path, monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         train("run", kill)
-    one, two = load_kind(train("run"))[0], load_kind(train("whole"))[0]
+    one, two = load_kind_network(train("run"))[0], load_kind_network(train("whole"))[0]
     whole = two.state_dict()
     assert all(torch.equal(value, whole[name]) for name, value in one.state_dict().items())
 
 
 def test_what_was_trained_tells_steps_from_balls_and_which_way_they_stand(trained):
-    network, metadata = load_kind(trained)
+    network, metadata = load_kind_network(trained)
     assert metadata["category"] == "step" and metadata["train"] == asdict(MORE)
     assert metadata["shapes"]["blocks"]["count"] == 10
     assert metadata["shapes"]["balls"]["licences"] == {"CC0": 11}
@@ -223,14 +222,14 @@ def test_data_that_do_not_serve_are_refused(folders, tmp_path, untrained):
     with pytest.raises(DataError, match="is of the category 'step', not 'chair'"):
         train_kind("chair", [folders[0]], [], tmp_path / "run", settings=FEW)
     with pytest.raises(ModelError, match="holds weights of preset 'default', not what tells"):
-        load_kind(untrained)
+        load_kind_network(untrained)
 
 
 def test_the_zoo_keeps_it_apart_from_the_fields(trained, tmp_path, monkeypatch):
     assert add_to_zoo(trained, zoo=tmp_path).name == "step" and list_models(tmp_path) == []
     monkeypatch.setattr(kinds, "KIND_ZOO", tmp_path / "kind")
     assert [e.name for e in list_models(tmp_path / "kind")] == ["step"]
-    assert kinds.find_kind("teapot") is None
+    assert kinds.find_kind_network("teapot") is None
 
 
 @pytest.mark.parametrize("category", ["chair", "car", "plane"])
@@ -262,11 +261,11 @@ def test_an_aligned_scan_is_checked_in_its_pose():
     found = align(model, PointCloud(member("chair") @ turn.T), up="z")
     assert found.kind.fits and found.kind.probability > LEAST
     car = align(model, PointCloud(member("car") @ turn.T), up="z")
-    assert not car.kind.fits and set(car.kind.warnings) <= set(car.doubts)
+    assert not car.kind.fits and set(car.kind.warnings) <= set(car.warnings)
 
 
 def test_without_a_network_a_target_is_compared_with_the_reference(monkeypatch):
-    monkeypatch.setattr("nrdf.field.cloud_encoder.find_kind", lambda category: None)
+    monkeypatch.setattr("nrdf.field.cloud_encoder.find_kind_network", lambda category: None)
     taught = nrdf.load_model("chair").set_reference(PointCloud(member("chair")))
     same = taught.check_kind(taught.model.encode(PointCloud(member("chair", 1_000_010))))
     car = taught.check_kind(taught.model.encode(PointCloud(member("car"))))

@@ -11,17 +11,16 @@ import torch
 
 from builders.step_shape import step_shape
 from nrdf.errors import DataError, ModelError, OutputError
-from nrdf.field import yaw as yaws
+from nrdf.field import yaw_network as yaws
 from nrdf.field.weights import load_tensors
-from nrdf.field.yaw import YawNetwork, at_yaws, load_yaw, turn
+from nrdf.field.yaw_network import YawNetwork, load_yaw_network, log_probability_at, turn
 from nrdf.field.zoo import add_to_zoo, list_models
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, about_up
 from nrdf.io.locks import write_lock
 from nrdf.shapes.dataset import IndexRow, write_index, write_shape
-from nrdf.training import small
+from nrdf.training.camera_views import CAMERAS, load_views, split
 from nrdf.training.provenance import Entry, list_shapes
-from nrdf.training.scanned import CAMERAS, load_views, split
-from nrdf.training.yaw import YawSettings, draw, loss_of, train_yaw
+from nrdf.training.yaw_network import YawSettings, draw, loss_of, train_yaw
 
 FEW = YawSettings(steps=12, batch=8)
 MORE = YawSettings(steps=100, batch=16, rate=5e-3)
@@ -76,7 +75,7 @@ def test_few_points_are_enough():
 def test_between_its_bins_a_distribution_is_interpolated():
     told = np.full(36, -5.0)
     told[[0, 35]] = -1.0, -2.0
-    found = at_yaws(told, np.radians([0.0, -5.0, 355.0, 10.0, 365.0]))
+    found = log_probability_at(told, np.radians([0.0, -5.0, 355.0, 10.0, 365.0]))
     np.testing.assert_allclose(found, [0, -0.5, -0.5, -4, -2])
 
 
@@ -116,7 +115,7 @@ def test_the_test_split_and_every_tenth_shape_are_left_out(folder):
 
 
 def test_training_goes_on_where_it_was_killed(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(small, "CHECKPOINT_EVERY", 5)
+    monkeypatch.setattr("nrdf.training.small_networks.CHECKPOINT_EVERY", 5)
 
     def kill(done: int, total: int) -> None:
         if done == 8:
@@ -139,7 +138,7 @@ def test_a_second_training_in_the_same_folder_is_refused(folder, tmp_path):
 
 
 def test_what_was_trained_says_what_it_is_and_tells_yaw(trained):
-    found, metadata = load_yaw(trained)
+    found, metadata = load_yaw_network(trained)
     assert metadata["category"] == "step" and metadata["train"] == asdict(MORE)
     assert metadata["shapes"] == {"blocks": {"count": 10, "licences": {"MIT": 10}}}
     assert metadata["scores"]["wrong-yaws"] < 0.5, "chance is 0.83"
@@ -165,15 +164,15 @@ def test_the_zoo_keeps_it_apart_from_the_fields(trained, untrained, tmp_path, mo
     assert entry.name == "step" and list_models(tmp_path) == []
     assert [e.name for e in list_models(tmp_path / "yaw")] == ["step"]
     monkeypatch.setattr(yaws, "YAW_ZOO", tmp_path / "yaw")
-    assert yaws.find_yaw("teapot") is None
+    assert yaws.find_yaw_network("teapot") is None
     with pytest.raises(ModelError, match="holds a field of preset 'default', not yaws"):
-        load_yaw(untrained)
+        load_yaw_network(untrained)
 
 
 def test_what_ships_is_whole_and_small():
     shipped = list_models(yaws.YAW_ZOO)
     assert {"car", "plane"} <= {entry.name for entry in shipped}
     for entry in shipped:
-        found = yaws.find_yaw(entry.category)
+        found = yaws.find_yaw_network(entry.category)
         assert found is not None and found.config.bins % 12 == 0
         assert entry.bytes < 500_000 and entry.scores["wrong-yaws"] < 0.1

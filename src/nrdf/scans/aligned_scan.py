@@ -18,7 +18,7 @@ from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan, unthinned
-from nrdf.scans.kind import KindCheck, by_judge, by_network
+from nrdf.scans.kind_check import KindCheck, check_by_network, check_by_scorer
 from nrdf.scans.pose_scorer import PoseScorer
 
 _ONE_SIDED = (0.5, 0.9)
@@ -30,7 +30,7 @@ one of its sides shows the other one lacks."""
 class AlignedScan:
     """scan: as it was read; cleaned: the object in it; alignment: its poses; unit: of the scan."""
 
-    judge: PoseScorer
+    scorer: PoseScorer
     scan: PointCloud
     cleaned: Cleaned
     alignment: Alignment
@@ -46,14 +46,14 @@ class AlignedScan:
 
         Sheets whose side nothing tells stand for both (`EncodedCloud.two_sided`).
         """
-        seen = self.judge.model.encode(self.cleaned.cloud, self.pose, self._is_one_sided)
+        seen = self.scorer.model.encode(self.cleaned.cloud, self.pose, self._is_one_sided)
         return seen.two_sided()
 
     def encode_in_metres(self, unit: str) -> EncodedCloud:
         """As `encode`, of the object in metres, its scan being in `unit`."""
         pose = self.pose.then(Similarity(np.eye(3), np.zeros(3), METRES[unit]))
         cloud = in_metres(self.cleaned.cloud, unit)
-        return self.judge.model.encode(cloud, pose, self._is_one_sided)
+        return self.scorer.model.encode(cloud, pose, self._is_one_sided)
 
     def unthinned_in_metres(self, unit: str) -> PointCloud:
         """All points of the object that the scan has, thinned or not, in metres, the scan being in
@@ -70,13 +70,13 @@ class AlignedScan:
         """Whether the object looks like one of the category, in the likeliest pose."""
         points = self.cleaned.cloud.points
         points = points[downsample(points, WORKING_POINTS, np.random.default_rng(0))]
-        points, model = self.pose.to_canonical(points), self.judge.model
+        points, model = self.pose.to_canonical(points), self.scorer.model
         if model.kind_network is None:
-            return by_judge(self.judge, self.alignment.best.field_cost, points)
-        return by_network(model.kind_network, model.category, points, self.pose.rotation)
+            return check_by_scorer(self.scorer, self.alignment.best.field_cost, points)
+        return check_by_network(model.kind_network, model.category, points, self.pose.rotation)
 
     @property
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What a person should know before relying on the pose, in whole sentences."""
         found = []
         if self.cleaned.others:
@@ -114,7 +114,7 @@ def align(
     up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
     stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
     leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
-    the category's family. For many scans, make one `PoseScorer` and use `bring_in`.
+    the category's family. For many scans, make one `PoseScorer` and use `clean_and_align`.
 
     Raises CloudError for a direction or step that is not known and where no object is left,
     ModelError for a category without a family and no examples.
@@ -122,11 +122,11 @@ def align(
     direction = None if up == "auto" else up_axis(up)
     scan = as_cloud(scan, "the scan")
     known = [as_cloud(example, "an example") for example in examples]
-    return bring_in(PoseScorer(model, known), scan, direction, sensors, unit, skip)
+    return clean_and_align(PoseScorer(model, known), scan, direction, sensors, unit, skip)
 
 
-def bring_in(
-    judge: PoseScorer,
+def clean_and_align(
+    scorer: PoseScorer,
     scan: PointCloud,
     up: np.ndarray | None = None,
     sensors: np.ndarray | None = None,
@@ -147,8 +147,8 @@ def bring_in(
     cleaned = clean_scan(scan, up, skip)
     if up is None and cleaned.floor is not None:
         up = cleaned.floor.normal
-    alignment = align_scan(judge, cleaned.cloud, up)
+    alignment = align_scan(scorer, cleaned.cloud, up)
     longest = alignment.best.pose.scale
     return AlignedScan(
-        judge, scan, cleaned, alignment, find_unit(scan.unit, longest, judge.model.category)
+        scorer, scan, cleaned, alignment, find_unit(scan.unit, longest, scorer.model.category)
     )

@@ -19,7 +19,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.errors import DataError
-from nrdf.field.kind import (
+from nrdf.field.kind_network import (
     ASKEW,
     ORIENTATIONS,
     OTHER,
@@ -35,8 +35,7 @@ from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.shapes.boxes import Boxes
 from nrdf.shapes.dataset import INDEX
 from nrdf.shapes.prepare import find_meshes
-from nrdf.training.provenance import list_shapes, provenance
-from nrdf.training.scanned import (
+from nrdf.training.camera_views import (
     SURFACE_POINTS,
     Views,
     draw_seen,
@@ -45,7 +44,14 @@ from nrdf.training.scanned import (
     split,
     views_of,
 )
-from nrdf.training.small import Settings, fastest, run_steps, small_run, write_small
+from nrdf.training.provenance import list_shapes, provenance
+from nrdf.training.small_networks import (
+    Settings,
+    fastest,
+    run_steps,
+    small_run,
+    write_small_network,
+)
 
 _SHARES = {"forward": 0.22, "turned": 0.28, "askew": 0.08, "tilted": 0.07, "other": 0.35}
 """How often a step shows what."""
@@ -140,7 +146,7 @@ def train_kind(
             if count := sum(folder in mesh.parents for mesh in shown):
                 said = {"count": count, "licences": {_LICENCE: count}}
                 sources[f"meshes of other kinds ({folder.name})"] = said
-        return write_small(out, network, category, settings, sources, scores)
+        return write_small_network(out, network, category, settings, sources, scores)
 
 
 def draw(
