@@ -8,7 +8,7 @@ import pytest
 
 from builders.bsrc_folder import member_clouds, write_bsrc
 from nrdf.errors import OutputError
-from nrdf.viz.picture import region_colours
+from nrdf.viz.palette import region_colours
 from nrdf_benchmark import figure as module
 from nrdf_benchmark.bsrc import read_bsrc
 from nrdf_benchmark.figure import draw_comparison

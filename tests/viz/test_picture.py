@@ -6,7 +6,8 @@ import pytest
 
 from nrdf.errors import OutputError
 from nrdf.geometry.sampling import fibonacci_directions
-from nrdf.viz.picture import Panel, draw_regions, region_colours, render_details, render_panels
+from nrdf.viz.palette import region_colours
+from nrdf.viz.picture import Panel, draw_regions, render_details, render_panels
 
 BALL = fibonacci_directions(4000)
 
@@ -80,11 +81,6 @@ def test_unwritable_path_is_an_output_error_and_leaves_nothing(tmp_path):
     with pytest.raises(OutputError, match=r"cannot write .*x.png"):
         draw_regions([Panel("ball", BALL, BALL)], tmp_path / "none" / "x.png", 60)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_every_region_has_its_own_colour():
-    colours = region_colours([str(i) for i in range(12)])
-    assert len({tuple(colour) for colour in colours.values()}) == 12
 
 
 def ring(height, radius=1.0):

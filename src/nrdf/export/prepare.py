@@ -9,6 +9,7 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.rotation import tool_z_out
+from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _FARTHEST_M = 100.0
@@ -83,7 +84,7 @@ def strokes(path: ToolPath, blend_m: float) -> list[Stroke]:
     positions = np.concatenate([segment.positions for segment in path.segments])
     quaternions = np.concatenate([segment.quaternions_xyzw for segment in path.segments])
     kept = np.ones(len(positions), bool)
-    moved = np.linalg.norm(np.diff(positions, axis=0), axis=1) > _SAME
+    moved = step_lengths(positions) > _SAME
     # |q - q'| or |q + q'|: both signs are the same orientation.
     turned = np.minimum(
         np.abs(np.diff(quaternions, axis=0)).max(axis=1),

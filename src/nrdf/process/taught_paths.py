@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.frames import z_axes
 from nrdf.geometry.units import in_words
 from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
@@ -89,8 +89,7 @@ def normals_under(surface: Surface, segments: Sequence[Segment]) -> list[np.ndar
     """Outward normals (n, 3) of the surface under the tool at each segment's waypoints."""
     found = []
     for segment in segments:
-        axes = -Rotation.from_quat(segment.quaternions_xyzw).as_matrix()[:, :, 2]
-        found.append(surface_under(surface, segment.positions, axes)[1])
+        found.append(surface_under(surface, segment.positions, -segment.axes)[1])
     return found
 
 
@@ -99,5 +98,5 @@ def contact_points(
 ) -> np.ndarray:
     """Where tools at positions (n, 3) touch or point at the surface, (n, 3): a stand-off ahead of
     the tool centre point, along tool z."""
-    along = Rotation.from_quat(quaternions_xyzw).as_matrix()[:, :, 2]
+    along = z_axes(quaternions_xyzw)
     return np.asarray(positions + standoff_m * along)

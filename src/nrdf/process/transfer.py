@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.geometry.polylines import longest_step
 from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
@@ -45,7 +46,7 @@ from nrdf.process.transfer_result import (
     TransferResult,
     reason_to_skip,
 )
-from nrdf.process.warp import longest_step, warp_segments
+from nrdf.process.warp import warp_segments
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from nrdf.process.correspondence import Correspondence, lengths
+from nrdf.geometry.polylines import step_lengths
+from nrdf.process.correspondence import Correspondence
 from nrdf.process.taught_paths import surface_under
 from nrdf.toolpath.frames import surface_frames, travel_of
 from nrdf.toolpath.types import Segment
@@ -59,8 +60,8 @@ def warp_segments(
     warped, lost = [], int((~exists).sum())
     for number, segment in enumerate(segments):
         own = np.flatnonzero(owner == number)
-        step_there = lengths(np.diff(found[own], axis=0))
-        step_here = lengths(np.diff(under[own], axis=0))
+        step_there = step_lengths(found[own])
+        step_here = step_lengths(under[own])
         torn = step_there > _TORN * correspondence.scale * step_here + _GAP * target.spacing
         for run in _runs(exists[own], torn):
             at = own[run]
@@ -82,11 +83,6 @@ def warp_segments(
                 )
             )
     return tuple(warped), lost
-
-
-def longest_step(positions: np.ndarray) -> float:
-    """The longest distance between neighbours of positions (n, 3)."""
-    return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).max(initial=0.0))
 
 
 def _frames(

@@ -16,7 +16,7 @@ from nrdf.io.files import open_file
 from nrdf.io.formats.arrays import array_head, open_arrays
 from nrdf.regions.match import Match
 from nrdf.regions.region import region_name_fault
-from nrdf.viz.picture import region_colours
+from nrdf.viz.palette import region_colours
 
 
 def read_regions(paths: Sequence[Path], unit: str | None = None) -> dict[str, np.ndarray]:

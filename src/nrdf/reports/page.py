@@ -14,7 +14,7 @@ import numpy as np
 from nrdf.geometry.units import in_words
 from nrdf.io.atomic import write_atomically
 from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
-from nrdf.viz.picture import region_colours
+from nrdf.viz.palette import region_colours
 
 _STYLE = """
 :root { --ink: #1f2328; --soft: #656d76; --line: #d8dee4; --bad: #b42318; --good: #1a7f37; }

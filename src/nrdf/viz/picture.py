@@ -17,20 +17,13 @@ from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
 from nrdf.io.atomic import write_atomically
-from nrdf.viz.render import FRONT, Camera, Scene, Strokes, render
+from nrdf.viz.palette import DEEP, NO_REGION, PALE, region_colours
+from nrdf.viz.render import FRONT, Camera, Scene, SurfaceLines, render
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-BASE_COLOUR = (0.80, 0.81, 0.83)
-PALETTE = (
-    "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442",
-    "#882255", "#44AA99", "#999933", "#332288", "#AA4499",
-)  # fmt: skip
-"""Okabe and Ito's colours for the colour-blind, then those of Tol's "muted" that differ most."""
-PALE, DEEP = 0.55, 0.55
-"""Shares of a region's colour in the region, and in the lines on it, where there are lines."""
-MOST_POINTS = 20_000
+_MAX_POINTS = 20_000
 _MARGIN = 0.05  # canonical, around each object
 
 
@@ -57,12 +50,6 @@ class Panel:
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     note: str = ""
     lines: Mapping[str, Sequence[np.ndarray]] = field(default_factory=dict)
-
-
-def region_colours(names: Sequence[str]) -> dict[str, np.ndarray]:
-    """One colour (3,) in [0, 1] for each region name, in order; repeats after twelve."""
-    values = [[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in PALETTE]
-    return {name: np.array(values[i % len(values)]) for i, name in enumerate(names)}
 
 
 def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> None:
@@ -99,8 +86,7 @@ def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, n
     """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side
     and with its own lines."""
     every = list(dict.fromkeys((*panel.regions, *panel.lines)))
-    table = np.array([*region_colours(every).values(), BASE_COLOUR])
-    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+    table, pale = _fills(region_colours(every))
     scene = _prepare(panel, every)
 
     def draw(name: str) -> np.ndarray:
@@ -121,13 +107,20 @@ def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, n
         return dict(zip(names, pool.map(draw, names), strict=True))
 
 
+def _fills(colours: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Each region's colour, without and with lines on it, and last that of no region, (r + 1, 3)
+    each."""
+    table = np.array([*colours.values(), NO_REGION])
+    return table, np.array([*(PALE * table[:-1] + (1 - PALE)), NO_REGION])
+
+
 def _prepare(panel: Panel, names: list[str]) -> Scene:
     points = np.asarray(panel.points, np.float64)
     region = np.full(len(points), -1)
     # Where regions overlap, the one listed last is on top.
     for name, chosen in panel.regions.items():
         region[np.asarray(chosen)] = names.index(name)
-    kept = downsample(points, MOST_POINTS, np.random.default_rng(0))
+    kept = downsample(points, _MAX_POINTS, np.random.default_rng(0))
     centre, scale = canonical_transform(points[kept])
     points = (points[kept] - centre) / scale
     normals = estimate_normals(points) if panel.normals is None else panel.normals[kept]
@@ -140,7 +133,9 @@ def _prepare(panel: Panel, names: list[str]) -> Scene:
     typical = float(np.median(spacing))
     radius = np.clip(spacing, 0.6 * typical, 1.4 * typical)
     lines = [
-        Strokes(names.index(name), tuple((np.asarray(line) - centre) / scale for line in drawn))
+        SurfaceLines(
+            names.index(name), tuple((np.asarray(line) - centre) / scale for line in drawn)
+        )
         for name, drawn in panel.lines.items()
     ]
     return Scene(points, smooth, region[kept], radius, tuple(lines))
@@ -156,8 +151,7 @@ def _row(
     high = np.max([corner[1] for corner in corners], axis=0) + _MARGIN
     pixels = size / (high[0] - low[0])
     shape = (int(np.ceil(pixels * (high[1] - low[1]))), size)
-    table = np.array([*colours.values(), BASE_COLOUR])
-    pale = np.array([*(PALE * table[:-1] + (1 - PALE)), BASE_COLOUR])
+    table, pale = _fills(colours)
 
     def draw(cloud: Scene, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         first = np.maximum(np.floor((corner[0] - _MARGIN - low) * pixels).astype(int), 0)

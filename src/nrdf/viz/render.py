@@ -48,7 +48,7 @@ FRONT = Camera(0.65, 0.38)
 
 
 @dataclass(frozen=True)
-class Strokes:
+class SurfaceLines:
     """Lines (k, 3), canonical, of one region's number."""
 
     region: int
@@ -64,7 +64,7 @@ class Scene:
     normals: np.ndarray
     region: np.ndarray
     radius: np.ndarray
-    lines: tuple[Strokes, ...] = ()
+    lines: tuple[SurfaceLines, ...] = ()
 
     def select(self, mask: np.ndarray, region: int) -> Scene:
         """Only the points of a mask (n,), and the lines of one region's number."""
@@ -103,11 +103,11 @@ def render(
     image = np.ones((*shape, 3), np.float32)
     image[painted] = colour[owner[painted]]
     image *= _eye_dome(np.where(painted, depth, np.float32(-1.5)), _OVERSAMPLING)[..., None]
-    for strokes in cloud.lines:
+    for lines in cloud.lines:
         # A line may dip into its own region, but does not shine through a thin part's other side.
-        own = (owner >= 0) & (cloud.region[owner] == strokes.region)
+        own = (owner >= 0) & (cloud.region[owner] == lines.region)
         cover = depth - np.where(own, np.float32(_SUNK), np.float32(0.0))
-        _paint(image, cover, strokes.lines, inks[strokes.region], axes, corner, pixels)
+        _paint(image, cover, lines.lines, inks[lines.region], axes, corner, pixels)
     steps = range(_OVERSAMPLING)
     parts = [image[i::_OVERSAMPLING, j::_OVERSAMPLING] for i in steps for j in steps]
     return np.clip(np.add.reduce(parts) / np.float32(len(parts)), 0.0, 1.0)

@@ -161,12 +161,12 @@ def test_what_is_drawn(results):
 
 
 def test_overlaps_are_dark(results):
-    from nrdf.studio.scene.colours import SHARED
+    from nrdf.viz.palette import SEVERAL_REGIONS
 
     editor = results.editor
     editor.paint(REFERENCE, "front", editor.document.region("top").mask)
     drawn = colours_of(editor, results, REFERENCE)
-    assert (drawn[editor.document.region("top").mask] == SHARED.astype(np.uint8)).all()
+    assert (drawn[editor.document.region("top").mask] == np.array(SEVERAL_REGIONS)).all()
 
 
 def test_what_is_saved_can_be_read_by_the_command_line(results):

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from nrdf.geometry.polylines import step_lengths
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import Library
 from nrdf.robot.planning.joint_paths import Stroke, retreat
@@ -255,7 +256,7 @@ def _stroke(cell: Cell, line: Line, stroke: Stroke) -> list[Action]:
         if kind == "process":
             way, number = stroke.way, stroke.at
         tips = cell.chain.frames(way).tcp
-        seconds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / feed
+        seconds = step_lengths(tips) / feed
         timing = time_parameterize(cell.chain, way, seconds)
         nearest = np.searchsorted(np.rint(number), np.arange(len(joints)))
         timing = replace(

@@ -17,15 +17,21 @@ from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.simulation.execute import Log
 from nrdf.robot.simulation.scene import cell_specification
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
-from nrdf.viz.picture import region_colours
+from nrdf.viz.palette import (
+    COVERED,
+    LEFT_OUT,
+    NO_REGION,
+    NOT_COVERED,
+    NOT_REACHED,
+    REACHED,
+    region_colours,
+)
 
 log = logging.getLogger(__name__)
 
 FILM, STILL, COVERAGE = "film.webp", "picture.png", "coverage.png"
 _SIZE, _FILM_SIZE = (1080, 810), (520, 400)
 _FRAMES, _FRAME_MS = 90, 120
-_PLAIN, _DONE, _MISSED = (0.80, 0.81, 0.83), (0.10, 0.62, 0.35), (0.84, 0.25, 0.15)
-_LEFT_OUT = (0.93, 0.70, 0.20)
 
 
 def draw(
@@ -236,14 +242,14 @@ def _parts(
     distance_field, lesson = simulated.distance_field, simulated.simulation_job.bound_knowledge
     points = lesson.cloud.points
     label = np.zeros(len(points), int)
-    palette: list[tuple[float, ...]] = [_PLAIN]
+    palette: list[tuple[float, ...]] = [NO_REGION]
     if colours == "regions":
         inks = region_colours(list(lesson.regions))
         for number, name in enumerate(lesson.regions, 1):
             label[lesson.regions[name]] = number
             palette.append(tuple(0.55 * inks[name] + 0.45))
     else:
-        palette += [_DONE, _MISSED, _LEFT_OUT]
+        palette += [COVERED, NOT_COVERED, LEFT_OUT]
         for driven in simulated.paths:
             out = driven.metrics
             found = np.where(out.worked, 1, np.where(out.wanted, 2, 3))
@@ -280,7 +286,7 @@ def _add_lines(scene: Any, driven: SimulatedPath, pose: np.ndarray) -> None:
             if scene.ngeom >= scene.maxgeom:
                 return
             good = verdict[k] == "reached" and verdict[k + 1] == "reached"
-            colour = (0.10, 0.12, 0.20, 1.0) if good else (0.85, 0.10, 0.10, 1.0)
+            colour = (*(REACHED if good else NOT_REACHED), 1.0)
             geom = scene.geoms[scene.ngeom]
             mujoco.mjv_initGeom(
                 geom, mujoco.mjtGeom.mjGEOM_CAPSULE, np.zeros(3), np.zeros(3),

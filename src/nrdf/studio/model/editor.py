@@ -20,7 +20,7 @@ from nrdf.studio.model.paintable_cloud import PaintableCloud
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.teaching import changed_step, new_step, painted_regions_of
 from nrdf.studio.model.uploads import shown_name, thinned_reference
-from nrdf.studio.scene.colours import next_colour
+from nrdf.viz.palette import next_region_colour
 
 _FIRST_KIND = "sand"
 
@@ -76,7 +76,7 @@ class Editor:
         loaded = self.session.store(shown_name(name), lesson.cloud)
         colours: dict[str, tuple[int, int, int]] = {}
         for region in lesson.knowledge.regions:
-            colours[region.name] = next_colour(list(colours.values()))
+            colours[region.name] = next_region_colour(list(colours.values()))
         knowledge = lesson.knowledge
         regions = painted_regions_of(lesson, colours)
         self.session.change(
@@ -108,7 +108,7 @@ class Editor:
         document = self.document
         taken = [region.name for region in document.regions]
         name = _free(name or "region", taken, always=not name)
-        colour = next_colour([region.colour for region in document.regions])
+        colour = next_region_colour([region.colour for region in document.regions])
         mask = np.zeros(len(self.paintable(REFERENCE).cloud), bool)
         added = PaintedRegion(name, colour, mask, (new_step(_FIRST_KIND),))
         self.session.change(replace(document, regions=(*document.regions, added)))

@@ -6,22 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nrdf.viz.picture import BASE_COLOUR, PALETTE
+from nrdf.viz.palette import NO_REGION, SEVERAL_REGIONS, confidence_scale, similarity_scale
 
 COLOURINGS = ("regions", "confidence", "likeness")
 """What the colours of points may show."""
-BARE = np.array(BASE_COLOUR) * 255
-SHARED = np.array([30.0, 30.0, 34.0])
-"""Points of more than one region."""
-SURE, DOUBTED = np.array([26.0, 152.0, 80.0]), np.array([215.0, 48.0, 39.0])
-_MIDDLE = np.array([254.0, 224.0, 139.0])
-_COLD, _HOT = np.array([49.0, 54.0, 149.0]), np.array([253.0, 231.0, 37.0])
-
-
-def next_colour(taken: Sequence[tuple[int, int, int]]) -> tuple[int, int, int]:
-    """The first colour of the palette that no region has."""
-    colours = [_rgb(c) for c in PALETTE]
-    return next((c for c in colours if c not in taken), colours[len(taken) % len(colours)])
+BARE = np.array(NO_REGION) * 255
 
 
 def painted_colours(
@@ -36,7 +25,7 @@ def painted_colours(
         mixed = strength[:, None] * colour + (1 - strength[:, None]) * 255
         drawn[indices] = mixed
         times[indices] += 1
-    drawn[times > 1] = SHARED
+    drawn[times > 1] = SEVERAL_REGIONS
     return drawn.astype(np.uint8)
 
 
@@ -47,9 +36,7 @@ def confidence_colours(count: int, regions: Sequence[tuple[np.ndarray, np.ndarra
     """
     drawn = np.tile(BARE, (count, 1))
     for indices, confidence in regions:
-        share = np.clip(confidence, 0.0, 1.0)[:, None]
-        low = DOUBTED + 2 * np.minimum(share, 0.5) * (_MIDDLE - DOUBTED)
-        drawn[indices] = np.where(share <= 0.5, low, _MIDDLE + (2 * share - 1) * (SURE - _MIDDLE))
+        drawn[indices] = confidence_scale(confidence)
     return drawn.astype(np.uint8)
 
 
@@ -58,9 +45,4 @@ def similarity_colours(distance: np.ndarray, width: float) -> np.ndarray:
 
     distance: (n,) descriptor distances; width: the distance at which the similarity is 1/e.
     """
-    alike = np.exp(-((distance / max(width, 1e-6)) ** 2))[:, None]
-    return (_COLD + alike * (_HOT - _COLD)).astype(np.uint8)
-
-
-def _rgb(text: str) -> tuple[int, int, int]:
-    return (int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16))
+    return similarity_scale(np.exp(-((distance / max(width, 1e-6)) ** 2)))
