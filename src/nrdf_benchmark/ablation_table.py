@@ -129,9 +129,9 @@ def validation_losses(field: Field, dataset: ShapeDataset) -> dict[str, float]:
         size = min(VALIDATION_BATCH, *(len(of.members) for of in pool.pools))
         for step in range(VALIDATION_STEPS):
             batch = pool.batch(size, seed=0, step=step)
-            forward = LossContext(field, batch, seeded(dataset.device, step), VALIDATION_POINTS)
+            context = LossContext(field, batch, seeded(dataset.device, step), VALIDATION_POINTS)
             for variant, loss in OMITTED.items():
-                sums[variant] += float(LOSSES[loss](forward))
+                sums[variant] += float(LOSSES[loss](context))
     return {name: value / (VALIDATION_STEPS * len(pools)) for name, value in sums.items() if pools}
 
 

@@ -22,7 +22,7 @@ SMALL = {
     "decoder_blocks": 1,
     "inverse_width": 16,
     "inverse_blocks": 1,
-    "look_blocks": 1,
+    "refine_blocks": 1,
 }
 
 

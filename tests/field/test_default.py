@@ -23,7 +23,7 @@ SMALL = {
     "decoder_blocks": 1,
     "inverse_width": 14,
     "inverse_blocks": 1,
-    "look_blocks": 1,
+    "refine_blocks": 1,
 }
 
 
@@ -57,7 +57,7 @@ def test_sizes_of_everything(moved):
     k = moved.describe(z, points, normals)
     assert k.shape == (2, 50, 16 * 2 + 1 + 9) == (2, 50, moved.decoder.descriptor_size)
     found = moved.invert(z, k)
-    assert found.points.shape == found.normals.shape == found.first.shape == (2, 50, 3)
+    assert found.points.shape == found.normals.shape == found.coarse_points.shape == (2, 50, 3)
     assert found.existence.shape == found.log_error.shape == (2, 50)
     assert torch.allclose(found.normals.norm(dim=-1), torch.ones(2, 50), atol=1e-5)
     assert encoded_size(2) == 15
@@ -90,7 +90,7 @@ def test_c_starts_half_way_between_copy_and_box_copy(fresh):
     grown = points * next(extents) / next(extents)
     assert (grown - points).abs().max() > 0.02
     assert torch.allclose(found.points, (points + grown) / 2, atol=1e-6)
-    assert torch.equal(found.points, found.first)
+    assert torch.equal(found.points, found.coarse_points)
     assert torch.allclose(found.normals, normals, atol=1e-6)
     assert (found.existence == 3).all() and (found.log_error == -3).all()
     own = fresh.invert(z, fresh.describe(z, points, normals))

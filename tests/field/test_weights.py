@@ -12,7 +12,15 @@ from safetensors.torch import load_file, save_file
 from builders.tiny_field import TinyField
 from nrdf.errors import ModelError, OutputError
 from nrdf.field import PRESETS, build_field
-from nrdf.field.weights import FORMAT, _digest, load_weights, read_metadata, save_weights
+from nrdf.field.weights import (
+    FORMAT,
+    _digest,
+    load_tensors,
+    load_weights,
+    read_metadata,
+    save_weights,
+)
+from nrdf.field.zoo import find_weights
 
 
 @pytest.fixture(autouse=True)
@@ -184,3 +192,15 @@ def test_a_place_that_cannot_be_written_is_an_output_error(tmp_path):
 def test_a_category_is_needed(tmp_path):
     with pytest.raises(ValueError, match="category"):
         save_weights(tmp_path / "x", build_field("tiny"), {})
+
+
+def test_files_from_before_a_part_was_renamed_still_load():
+    path = find_weights("chair")
+    metadata, tensors = load_tensors(path)
+    assert "look_blocks" in metadata["field"] and "inverse.look.weight" in tensors
+    field = load_weights(path)[0]
+    assert field.config.refine_blocks == metadata["field"]["look_blocks"]
+    state = field.state_dict()
+    assert torch.equal(state["inverse.refine.weight"], tensors["inverse.look.weight"].float())
+    old, new = "inverse.look_blocks.0.inner.bias", "inverse.refine_blocks.0.inner.bias"
+    assert torch.equal(state[new], tensors[old].float())

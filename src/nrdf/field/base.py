@@ -1,8 +1,8 @@
 """The interface that every field has, whatever network is behind it.
 
-A field is trained for one category. It embeds a shape (z), describes points on it (k, the
-descriptor function θ of the paper), and finds the point of another shape that a descriptor
-belongs to (C, the inverse descriptor function).
+A field is trained for one category. It embeds a shape (z), gives points on it descriptors (k, by
+the paper's descriptor function θ), and finds the point of another shape that a descriptor belongs
+to (C, the inverse descriptor function).
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ class FieldConfig(BaseModel):
 
 
 class Inverse(NamedTuple):
-    """What the inverse descriptor function says about m descriptors on each of b targets."""
+    """Output of the inverse descriptor function for m descriptors on each of b targets."""
 
     points: Tensor
     """(b, m, 3) canonical coordinates on the target."""
     normals: Tensor | None = None
     """(b, m, 3) unit outward normals there, when the field predicts them."""
     existence: Tensor | None = None
-    """(b, m) logits: does the target have such a place at all?"""
+    """(b, m) logits: does the target have a corresponding point at all?"""
     log_error: Tensor | None = None
     """(b, m) logarithm of the error that the field expects of `points`."""
-    first: Tensor | None = None
-    """(b, m, 3) where the field landed before it corrected itself, when it does."""
+    coarse_points: Tensor | None = None
+    """(b, m, 3) the prediction before its refinement, when the field has one."""
 
 
 class Field(nn.Module, ABC):

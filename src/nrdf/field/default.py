@@ -1,4 +1,4 @@
-"""The `default` preset: oriented descriptors, a box-aligned start and a local look.
+"""The `default` preset: oriented descriptors, a box-aligned start and a local refinement.
 
 It keeps the paper's three parts (encoder A, occupancy decoder B whose activations are the
 descriptor, inverse C) and changes what was measured to matter:
@@ -8,8 +8,8 @@ descriptor, inverse C) and changes what was measured to matter:
   global latent (planes as in Convolutional Occupancy Networks, Peng et al., ECCV 2020);
 - the descriptor of a point carries its normal, so that the two sides of a thin part differ;
 - C predicts a displacement from half-way between the reference point and its copy in the target's
-  bounding box, then looks up the target's local features where it landed and corrects itself once.
-  It is one forward pass: nothing is optimised for a pair.
+  bounding box (coarse), then samples the target's local features there and corrects itself once
+  (refine). It is one forward pass: nothing is optimised for a pair.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class DefaultConfig(FieldConfig):
     decoder_blocks: int = 2
     inverse_width: int = 192
     inverse_blocks: int = 2
-    look_blocks: int = 2
+    refine_blocks: int = 2
 
 
 class DefaultField(Field):
@@ -120,13 +120,13 @@ class Encoder(nn.Module):
         cells, channels = self.config.plane_cells, self.config.plane_channels
         batch = len(points)
         cell = ((points / _PLANE_SIDE + 0.5) * cells).long().clamp(0, cells - 1)
-        first = torch.arange(batch, device=points.device)[:, None] * cells * cells
-        counted = torch.cat([features, torch.ones_like(features[..., :1])], dim=-1).flatten(0, 1)
+        offset = torch.arange(batch, device=points.device)[:, None] * cells * cells
+        with_count = torch.cat([features, torch.ones_like(features[..., :1])], dim=-1).flatten(0, 1)
         planes = []
         for row, column in _PLANE_AXES:
-            index = (first + cell[..., row] * cells + cell[..., column]).flatten()
-            sums = counted.new_zeros(batch * cells * cells, channels + 1)
-            sums = sums.index_add(0, index, counted)
+            index = (offset + cell[..., row] * cells + cell[..., column]).flatten()
+            sums = with_count.new_zeros(batch * cells * cells, channels + 1)
+            sums = sums.index_add(0, index, with_count)
             planes.append(sums[:, :-1] / sums[:, -1:].clamp_min(1))
         grid = torch.stack(planes, 1).view(batch, cells, cells, 3, channels)
         grid = grid.permute(0, 3, 4, 1, 2) + self.context(latent).view(batch, 3, channels, 1, 1)
@@ -173,8 +173,10 @@ class InverseDescriptor(nn.Module):
         self.condition = nn.Linear(config.latent, width)
         self.blocks = nn.ModuleList(ResidualBlock(width) for _ in range(config.inverse_blocks))
         self.leave = nn.Linear(width, 8)
-        self.look = nn.Linear(width + 3 * config.plane_channels + encoded, width)
-        self.look_blocks = nn.ModuleList(ResidualBlock(width) for _ in range(config.look_blocks))
+        self.refine = nn.Linear(width + 3 * config.plane_channels + encoded, width)
+        self.refine_blocks = nn.ModuleList(
+            ResidualBlock(width) for _ in range(config.refine_blocks)
+        )
         self.correct = nn.Linear(width, 8)
         for layer in (self.leave, self.correct):
             nn.init.zeros_(layer.weight)
@@ -189,25 +191,22 @@ class InverseDescriptor(nn.Module):
         for block in self.blocks:
             x = block(x)
         x = functional.relu(x)
-        first = self.leave(x)
-        landed = (points + box_copy) / 2 + first[..., :3]
-        # Where the look-up happens is not learned through the look-up: steadier, and cheaper.
-        place = landed.detach()
-        x = self.look(
-            torch.cat(
-                [x, sample_planes(planes, place), positional_encoding(place, self.octaves)], dim=-1
-            )
-        )
-        for block in self.look_blocks:
+        coarse = self.leave(x)
+        coarse_points = (points + box_copy) / 2 + coarse[..., :3]
+        # Where local features are sampled is not learned through the sampling: steadier, cheaper.
+        at = coarse_points.detach()
+        local = [sample_planes(planes, at), positional_encoding(at, self.octaves)]
+        x = self.refine(torch.cat([x, *local], dim=-1))
+        for block in self.refine_blocks:
             x = block(x)
-        second = self.correct(functional.relu(x))
-        turned = functional.normalize(normals + first[..., 3:6] + second[..., 3:6], dim=-1)
+        refined = self.correct(functional.relu(x))
+        outward = normals + coarse[..., 3:6] + refined[..., 3:6]
         return Inverse(
-            points=landed + second[..., :3],
-            normals=turned,
-            existence=first[..., 6] + second[..., 6] + 3.0,
-            log_error=first[..., 7] + second[..., 7] - 3.0,
-            first=landed,
+            points=coarse_points + refined[..., :3],
+            normals=functional.normalize(outward, dim=-1),
+            existence=coarse[..., 6] + refined[..., 6] + 3.0,
+            log_error=coarse[..., 7] + refined[..., 7] - 3.0,
+            coarse_points=coarse_points,
         )
 
 

@@ -25,6 +25,12 @@ FORMAT = "nrdf-weights-1"
 LARGEST = 500_000_000
 """Bytes that a weight file may have."""
 _TYPES = {torch.float16, torch.float32, torch.float64, torch.int64, torch.int32, torch.uint8}
+_RENAMED = {
+    "look_blocks": "refine_blocks",
+    "inverse.look_blocks.": "inverse.refine_blocks.",
+    "inverse.look.": "inverse.refine.",
+}
+"""Sizes, and beginnings of tensors' names, in older weight files; what they are called now."""
 _Module = TypeVar("_Module", bound=nn.Module)
 
 
@@ -67,14 +73,24 @@ def load_weights(
     """
     path = Path(path)
     metadata, tensors = load_tensors(path)
-    for kind, wanted in (("preset", preset), ("category", category)):
-        if wanted is not None and metadata.get(kind) != wanted:
+    for key, wanted in (("preset", preset), ("category", category)):
+        if wanted is not None and metadata.get(key) != wanted:
             raise ModelError(
-                f"{path} holds weights of {kind} '{metadata.get(kind)}', not '{wanted}'; "
-                f"load it as '{metadata.get(kind)}' or give another file"
+                f"{path} holds weights of {key} '{metadata.get(key)}', not '{wanted}'; "
+                f"load it as '{metadata.get(key)}' or give another file"
             )
-    kind = metadata["preset"]
-    return fill(path, kind, tensors, lambda: build_field(kind, metadata["field"])), metadata
+    name = metadata["preset"]
+    sizes = {_current_name(size): value for size, value in metadata["field"].items()}
+    tensors = {_current_name(key): value for key, value in tensors.items()}
+    return fill(path, name, tensors, lambda: build_field(name, sizes)), metadata
+
+
+def _current_name(name: str) -> str:
+    """The name that a size or a tensor has now, from that in a file."""
+    for old, new in _RENAMED.items():
+        if name.startswith(old):
+            return new + name.removeprefix(old)
+    return name
 
 
 def fill(

@@ -229,8 +229,8 @@ class Objective(nn.Module):
         """The sum () with gradient, and every loss () before weighting, without."""
         device = batch.points.device.type
         with torch.autocast(device, self._precision, self._precision != torch.float32):
-            forward = LossContext(self.field, batch, generator, self._cloud_points)
-            terms = {name: LOSSES[name](forward) for name in self._weights}
+            context = LossContext(self.field, batch, generator, self._cloud_points)
+            terms = {name: LOSSES[name](context) for name in self._weights}
         total = torch.stack([w * terms[name].float() for name, w in self._weights.items()]).sum()
         return total, {
             "total": total.detach(),

@@ -3,8 +3,7 @@
 Equation numbers are the paper's: (3) is the Chamfer distance and (7) the descriptor distance; the
 others follow from the order in which the paper's third stage lists its losses.
 
-Every loss is a function of a `LossContext`: a batch and what the field makes of it, each part
-computed once, when a loss first asks for it.
+Every loss is a function of a `LossContext`: a batch and what the field computes from it.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ ROBUST = 0.01
 
 
 class LossContext:
-    """A batch and what the field makes of it."""
+    """A batch and what the field computes from it, each part once, when a loss first needs it."""
 
     def __init__(
         self, field: Field, batch: Batch, generator: torch.Generator, cloud_points: int = 1024
@@ -54,8 +53,8 @@ class LossContext:
         return self.field.occupancy(self.z, self.batch.queries).float()
 
     @cached_property
-    def match(self) -> Inverse:
-        """The pairs' source points carried to the partner: points (p, m, 3)."""
+    def transferred(self) -> Inverse:
+        """The pairs' source points transferred to the partner: points (p, m, 3)."""
         batch = self.batch
         return self.field.transfer(
             self.z[batch.reference], batch.source, batch.source_normals, self.z[batch.partner]
@@ -82,13 +81,13 @@ class LossContext:
         return self.batch.partner[: len(self.cloud)]
 
     @cached_property
-    def own(self) -> Tensor:
-        """(b, c, 3) self reconstruction: each cloud from its own descriptors."""
+    def self_reconstruction(self) -> Tensor:
+        """(b, c, 3) each cloud from its own descriptors."""
         return self.field.invert(self.z, self.descriptors).points.float()
 
     @cached_property
-    def cross(self) -> Tensor:
-        """(b, c, 3) cross reconstruction: each shape's descriptors on its partner."""
+    def cross_reconstruction(self) -> Tensor:
+        """(b, c, 3) each shape's descriptors on its partner."""
         return self.field.invert(self.z[self.partner], self.descriptors).points.float()
 
 
@@ -114,116 +113,123 @@ def robust_distance(points: Tensor, batch: Batch) -> Tensor:
     return weighted_mean((square + ROBUST**2).sqrt() - ROBUST, batch.weight)
 
 
-def roughness(f: LossContext, values: Tensor) -> Tensor:
+def roughness(context: LossContext, values: Tensor) -> Tensor:
     """Mean of ‖v(x) − v(y)‖ over 512 random points x of each cloud and their 16 nearest y within
     0.1; values v (b, c, d) at the clouds' points."""
-    c = f.cloud_points
-    rows = torch.randperm(c, generator=f.generator, device=f.cloud.device)[:512]
-    apart, around = distances(f.cloud[:, rows], f.cloud).topk(
+    c = context.cloud_points
+    rows = torch.randperm(c, generator=context.generator, device=context.cloud.device)[:512]
+    apart, around = distances(context.cloud[:, rows], context.cloud).topk(
         min(17, c), dim=2, largest=False, sorted=True
     )
     apart, around = apart[:, :, 1:], around[:, :, 1:]
     return weighted_mean(distances_to(values, rows, around), (apart < 0.1).float())
 
 
-def occupancy(f: LossContext) -> Tensor:
+def occupancy(context: LossContext) -> Tensor:
     """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
-    return functional.binary_cross_entropy_with_logits(f.logits, f.batch.occupancy)
+    return functional.binary_cross_entropy_with_logits(context.logits, context.batch.occupancy)
 
 
-def self_reconstruction(f: LossContext) -> Tensor:
+def self_reconstruction(context: LossContext) -> Tensor:
     """(2): ‖C(z_i, θ(z_i, x)) − x‖², averaged over points x of shape i."""
-    return (f.own - f.cloud).square().sum(-1).mean()
+    return (context.self_reconstruction - context.cloud).square().sum(-1).mean()
 
 
-def chamfer(f: LossContext) -> Tensor:
+def chamfer(context: LossContext) -> Tensor:
     """(3): Σ over both directions of the mean of min ‖x − y‖², between x in the cross
     reconstruction C(z_j, θ(z_i, ·)) and y in shape j."""
-    return chamfer_distance(f.cross, f.cloud[f.partner])
+    return chamfer_distance(context.cross_reconstruction, context.cloud[context.partner])
 
 
-def emd(f: LossContext) -> Tensor:
+def emd(context: LossContext) -> Tensor:
     """(4): min over bijections φ of the mean of ‖x − φ(x)‖, from cross reconstruction to shape j;
     the bijection by auction (eps 0.005, 50 rounds)."""
-    return earth_movers_distance(f.cross, f.cloud[f.partner])
+    return earth_movers_distance(context.cross_reconstruction, context.cloud[context.partner])
 
 
-def descriptor_smoothness(f: LossContext) -> Tensor:
+def descriptor_smoothness(context: LossContext) -> Tensor:
     """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
-    return roughness(f, f.descriptors.float())
+    return roughness(context, context.descriptors.float())
 
 
-def normal_consistency(f: LossContext) -> Tensor:
+def normal_consistency(context: LossContext) -> Tensor:
     """(6): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
     by local PCA, its sign from the normal that x had on shape i."""
-    ours = local_normals(f.cross, towards=f.cloud_normals)
-    theirs = gather(f.cloud_normals[f.partner], nearest_indices(f.cross, f.cloud[f.partner]))
+    ours = local_normals(context.cross_reconstruction, towards=context.cloud_normals)
+    theirs = gather(
+        context.cloud_normals[context.partner],
+        nearest_indices(context.cross_reconstruction, context.cloud[context.partner]),
+    )
     return (1 - (ours * theirs).sum(-1)).mean()
 
 
-def descriptor_distance(f: LossContext) -> Tensor:
+def descriptor_distance(context: LossContext) -> Tensor:
     """(7): Chamfer distance between the descriptors of the cross reconstruction, taken on shape j,
     and those of shape i that it was made from.
 
     The paper writes it squared and in one direction; as in its released code the distances are
     not squared and both directions are averaged.
     """
-    ours = f.field.describe(f.z[f.partner], f.cross, f.cloud_normals)
-    theirs = f.descriptors
+    ours = context.field.describe(
+        context.z[context.partner], context.cross_reconstruction, context.cloud_normals
+    )
+    theirs = context.descriptors
     return (nearest_distance(ours, theirs).mean() + nearest_distance(theirs, ours).mean()) / 2
 
 
-def displacement_smoothness(f: LossContext) -> Tensor:
+def displacement_smoothness(context: LossContext) -> Tensor:
     """IMDC's smoothness (Liu & Liu 2020): of the displacements C(z_j, θ(z_i, x)) − x, as (5) has it
     of descriptors."""
-    return roughness(f, f.cross - f.cloud)
+    return roughness(context, context.cross_reconstruction - context.cloud)
 
 
-def correspondence(f: LossContext) -> Tensor:
+def correspondence(context: LossContext) -> Tensor:
     """Weighted mean of √(d² + ε²) − ε, d from C(z_j, θ(z_i, x)) to the known place of x on
     shape j; ε = 0.01 keeps doubtful correspondences from ruling (not in the paper)."""
-    return robust_distance(f.match.points, f.batch)
+    return robust_distance(context.transferred.points, context.batch)
 
 
-def landing(f: LossContext) -> Tensor:
-    """`correspondence` of where C first landed, before its local look (not in the paper). Zero
-    for a field that looks once only."""
-    if f.match.first is None:
-        return f.z.new_zeros(())
-    return robust_distance(f.match.first, f.batch)
+def coarse_correspondence(context: LossContext) -> Tensor:
+    """`correspondence` of C's points before their refinement (not in the paper). Zero for a field
+    that does not refine them."""
+    if context.transferred.coarse_points is None:
+        return context.z.new_zeros(())
+    return robust_distance(context.transferred.coarse_points, context.batch)
 
 
-def normal(f: LossContext) -> Tensor:
+def normal(context: LossContext) -> Tensor:
     """Weighted mean of 1 − n̂·n, n̂ predicted at the corresponding place, n known there (not in the
     paper). Zero for a field that predicts no normals."""
-    if f.match.normals is None:
-        return f.z.new_zeros(())
-    cosine = functional.cosine_similarity(f.match.normals.float(), f.batch.target_normals, dim=-1)
-    return weighted_mean(1 - cosine, f.batch.weight)
+    if context.transferred.normals is None:
+        return context.z.new_zeros(())
+    cosine = functional.cosine_similarity(
+        context.transferred.normals.float(), context.batch.target_normals, dim=-1
+    )
+    return weighted_mean(1 - cosine, context.batch.weight)
 
 
-def existence(f: LossContext) -> Tensor:
+def existence(context: LossContext) -> Tensor:
     """−[e log ê + (1 − e) log(1 − ê)] over the places of which it is known whether the target has
     them at all, e = 1 where it has (not in the paper). Zero for a field that predicts no
     existence."""
-    if f.match.existence is None:
-        return f.z.new_zeros(())
-    truth = (f.batch.weight > 0).float()
+    if context.transferred.existence is None:
+        return context.z.new_zeros(())
+    truth = (context.batch.weight > 0).float()
     each = functional.binary_cross_entropy_with_logits(
-        f.match.existence.float(), truth, reduction="none"
+        context.transferred.existence.float(), truth, reduction="none"
     )
-    return weighted_mean(each, f.batch.known.float())
+    return weighted_mean(each, context.batch.known.float())
 
 
-def error_scale(f: LossContext) -> Tensor:
+def error_scale(context: LossContext) -> Tensor:
     """Weighted mean of d/s + log s, the negative logarithm of a Laplace density of scale s, of the
     distance d (without gradient) that `correspondence` measures; s predicted (not in the paper).
     Zero for a field that predicts no error."""
-    if f.match.log_error is None:
-        return f.z.new_zeros(())
-    d = (f.match.points.float() - f.batch.target).norm(dim=-1).detach()
-    log_scale = f.match.log_error.float().clamp(-9, 3)
-    return weighted_mean(d * (-log_scale).exp() + log_scale, f.batch.weight)
+    if context.transferred.log_error is None:
+        return context.z.new_zeros(())
+    d = (context.transferred.points.float() - context.batch.target).norm(dim=-1).detach()
+    log_scale = context.transferred.log_error.float().clamp(-9, 3)
+    return weighted_mean(d * (-log_scale).exp() + log_scale, context.batch.weight)
 
 
 LOSSES: dict[str, Callable[[LossContext], Tensor]] = {
@@ -236,7 +242,7 @@ LOSSES: dict[str, Callable[[LossContext], Tensor]] = {
     "descriptor_distance": descriptor_distance,
     "displacement_smoothness": displacement_smoothness,
     "correspondence": correspondence,
-    "landing": landing,
+    "coarse_correspondence": coarse_correspondence,
     "normal": normal,
     "existence": existence,
     "error_scale": error_scale,
