@@ -17,6 +17,6 @@ for step in result.paths:  # in the order in which they are driven
         # step.path.segments: positions (n, 3) in metres, quaternions_xyzw (n, 4), feed, force
         print(
             f"{step.region:11s} {step.process.label:15s} {len(step.path.segments):4d} segments, "
-            f"{step.measures.coverage:.1%} covered, {step.measures.cycle_time_s:.0f} s"
+            f"{step.metrics.coverage:.1%} covered, {step.metrics.cycle_time_s:.0f} s"
         )
 nrdf.write_job("job", result, overwrite=True)  # as `nrdf transfer` does; then: nrdf export job …

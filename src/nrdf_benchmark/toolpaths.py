@@ -22,7 +22,7 @@ from nrdf.shapes.families.member import Member
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch, patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import Measures, measure
+from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
 from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
@@ -62,7 +62,7 @@ class PathResult:
     region: str
     width_m: float
     bend_rad: float
-    measures: Measures
+    metrics: ToolPathMetrics
     near: float | None
     seconds: float
 
@@ -121,7 +121,7 @@ def evaluate_toolpaths(
             start = time.process_time()
             segments = plan(surface, region, strategy)
             seconds = shared + time.process_time() - start
-            figures = measure(surface, region, strategy, segments)
+            figures = measure_path(surface, region, strategy, segments)
             width, bend = _shape(patches_of(surface, region))
             near = None if item.exact is None else _near(item.exact, segments, strategy)
             results.append(PathResult(item.name, name, width, bend, figures, near, seconds))
@@ -170,32 +170,32 @@ def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Fi
     made = [
         _figure(
             "coverage of what is not left out, %", ">= 99",
-            [_covered(r.measures) for r in results], 99.0, True,
+            [_covered(r.metrics) for r in results], 99.0, True,
         ),
         _figure(
             "worst line spacing, stepovers", "<= 1.15",
             [
-                r.measures.line_spacing_worst_m / strategy.stepover_m
+                r.metrics.line_spacing_worst_m / strategy.stepover_m
                 for r in results
-                if r.measures.line_spacing_worst_m is not None
+                if r.metrics.line_spacing_worst_m is not None
             ],
             1.15,
         ),
         _figure(
             "distance from smooth surface (99 %), mm", "<= 1",
-            [1e3 * r.measures.surface_distance_99_m for r in results], 1.0,
+            [1e3 * r.metrics.surface_distance_99_m for r in results], 1.0,
         ),
         _figure(
             "tool axis (99 %), degrees", "<= 5",
-            [float(np.degrees(r.measures.axis_error_99_rad)) for r in results], 5.0,
+            [float(np.degrees(r.metrics.axis_error_99_rad)) for r in results], 5.0,
         ),
         _figure(
             "largest step between waypoints, spacings", "<= 2",
-            [r.measures.step_worst_m / strategy.spacing_m for r in results], 2.0,
+            [r.metrics.step_worst_m / strategy.spacing_m for r in results], 2.0,
         ),
         _figure(
             "largest turn between waypoints, degrees", "<= 30",
-            [float(np.degrees(r.measures.turn_worst_rad)) for r in results], 30.0,
+            [float(np.degrees(r.metrics.turn_worst_rad)) for r in results], 30.0,
         ),
     ]  # fmt: skip
     near = [100.0 * r.near for r in results if r.near is not None]
@@ -204,10 +204,10 @@ def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Fi
     return [figure for figure in made if len(figure.values)]
 
 
-def _covered(measures: Measures) -> float:
+def _covered(metrics: ToolPathMetrics) -> float:
     """The share, in per cent, of what is to be worked that is worked."""
-    wanted = measures.coverage + measures.unreached
-    return 100.0 * measures.coverage / wanted if wanted > 0.0 else 0.0
+    wanted = metrics.coverage + metrics.unreached
+    return 100.0 * metrics.coverage / wanted if wanted > 0.0 else 0.0
 
 
 def _figure(

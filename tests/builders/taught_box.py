@@ -11,7 +11,7 @@ from nrdf.process.knowledge import Knowledge
 from nrdf.process.strategy import tool_path
 from nrdf.process.transfer_result import FoundRegion, PathResult, TransferResult
 from nrdf.regions.match import Match
-from nrdf.toolpath.metrics import Measures
+from nrdf.toolpath.metrics import ToolPathMetrics
 from nrdf.toolpath.types import Segment
 
 SIZE = np.array([0.5, 0.6, 0.9])
@@ -37,9 +37,9 @@ def faces(of):
     }
 
 
-MEASURES = Measures(
+METRICS = ToolPathMetrics(
     coverage=0.995,
-    left_out={"no_room": 0.0, "edge_margin": 0.0},
+    left_out={"no_clearance": 0.0, "edge_margin": 0.0},
     unreached=0.005,
     overlap=0.4,
     line_spacing_mean_m=0.04,
@@ -53,7 +53,7 @@ MEASURES = Measures(
     path_length_m=5.0,
     process_length_m=4.0,
     cycle_time_s=50.0,
-    judged_by="the mesh as given (12 triangles)",
+    compared_with="the mesh as given (12 triangles)",
     resolution_m=0.0,
     true_distance_worst_m=0.0012,
     true_distance_99_m=0.0008,
@@ -61,7 +61,7 @@ MEASURES = Measures(
 )
 
 
-def made_up(confidence=0.8, measures=MEASURES, missing="", reason="", **changes):
+def made_up(confidence=0.8, metrics=METRICS, missing="", reason="", **changes):
     """A transfer of one process, of these figures, that nobody planned."""
     taught = bound_knowledge({"top": [{**SAND, **changes}]})
     (process,) = taught.knowledge.regions[0].processes
@@ -76,7 +76,7 @@ def made_up(confidence=0.8, measures=MEASURES, missing="", reason="", **changes)
         process,
         process.transfer_mode,
         path,
-        measures if path else None,
+        metrics if path else None,
         (),
         missing or reason,
     )

@@ -91,9 +91,9 @@ def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
     assert transfer(taught, untrained, *words, "--max-surface-distance-mm", "20") == 0
     report = json.loads((taught / "job" / "report.json").read_text())
     for path in report["paths"]:
-        assert path["measures"]["judged_by"] == "the mesh as given (12 triangles)"
-        assert path["measures"]["true_distance_95_m"] < 1e-3
-        assert 5e-3 < path["measures"]["step_worst_m"] < 0.03
+        assert path["metrics"]["compared_with"] == "the mesh as given (12 triangles)"
+        assert path["metrics"]["true_distance_95_m"] < 1e-3
+        assert 5e-3 < path["metrics"]["step_worst_m"] < 0.03
     page = (taught / "job" / "report.html").read_text()
     assert "the mesh as given (12 triangles)" in page and "off the object" in page
     tight = ("--max-surface-distance-mm", "0", "--max-step-mm", "1", "--overwrite")

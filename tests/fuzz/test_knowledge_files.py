@@ -17,7 +17,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge, resolve
 from nrdf.process.check import CheckedProcess, check_knowledge
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
-from nrdf.toolpath import effort
+from nrdf.toolpath import plan_size
 
 BOX = cloud(count=600)
 TOP = faces(BOX)["top"]
@@ -82,7 +82,7 @@ def use(folder, knowledge):
     if isinstance(bound_knowledge, BoundKnowledge):
         for row in outcome_of(lambda: check_knowledge(bound_knowledge)):
             assert isinstance(row, CheckedProcess) and (row.fault == "") == (
-                row.measures is not None
+                row.metrics is not None
             )
 
 
@@ -109,7 +109,7 @@ def test_damaged_json(folder, content):
 @given(altered(CONTENT))
 def test_altered_content_is_read_bound_and_planned_or_refused(folder, content):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(effort, "MOST_WAYPOINTS", 3000)
+        patch.setattr(plan_size, "MOST_WAYPOINTS", 3000)
         knowledge = read(folder, yaml.dump(content, Dumper=yaml.SafeDumper).encode())
         if isinstance(knowledge, Knowledge):
             use(folder, knowledge)
@@ -130,7 +130,7 @@ def test_numbers_that_are_meant_are_planned_or_refused(folder, numbers, radius, 
     process["allow_unusual"] = True
     content = {**CONTENT, "regions": [{**region, "processes": [process]}]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(effort, "MOST_WAYPOINTS", 3000)
+        patch.setattr(plan_size, "MOST_WAYPOINTS", 3000)
         knowledge = read(folder, yaml.safe_dump(content).encode())
         if isinstance(knowledge, Knowledge):
             use(folder, knowledge)

@@ -60,7 +60,7 @@ def test_members_have_their_size_and_an_exact_surface():
     seat = replace(chair, regions={"seat": chair.regions["seat"]})
     (result,) = evaluate_toolpaths([seat], progress=done.append)
     assert done == [1]
-    assert result.measures.coverage > 0.99 and result.near > 0.9
+    assert result.metrics.coverage > 0.99 and result.near > 0.9
     with pytest.raises(DataError, match="0 members asked for"):
         next(family_members("chair", 0))
 

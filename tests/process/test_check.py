@@ -16,7 +16,7 @@ def checked(reference=None, name="top", **changes):
 def test_a_good_process_is_planned_and_measured():
     row = checked()
     assert (row.region, row.fault, row.where) == ("top", "", "region 'top', sand")
-    assert row.measures.coverage > 0.95
+    assert row.metrics.coverage > 0.95
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_a_good_process_is_planned_and_measured():
 )
 def test_what_cannot_be_done_is_said_by_field_and_value(change, message):
     row = checked(**change)
-    assert message in row.fault and row.measures is None
+    assert message in row.fault and row.metrics is None
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_what_can_be_done_but_is_doubtful_is_said(change, message):
 
 def test_a_spacing_longer_than_the_region_may_be_meant():
     row = checked(spacing_mm=950, allow_unusual=True)
-    assert row.fault == "" and row.measures.coverage > 0.9
+    assert row.fault == "" and row.metrics.coverage > 0.9
 
 
 def test_taught_lines_are_measured_as_they_are():
@@ -60,8 +60,8 @@ def test_taught_lines_are_measured_as_they_are():
     lines = [{"positions_m": [[x, 0.3, z] for z in along.tolist()]} for x in (-0.1, 0.0, 0.1)]
     row = checked(trajectory="taught", waypoints=lines)
     assert row.fault == ""
-    assert row.measures.coverage == pytest.approx(3 * 0.6 * 0.05 / (0.5 * 0.9), abs=0.06)
-    assert row.measures.process_length_m == pytest.approx(1.8, rel=0.02)
+    assert row.metrics.coverage == pytest.approx(3 * 0.6 * 0.05 / (0.5 * 0.9), abs=0.06)
+    assert row.metrics.process_length_m == pytest.approx(1.8, rel=0.02)
 
 
 def test_a_reference_without_normals_will_do_and_progress_is_told():
@@ -78,5 +78,5 @@ def test_a_reference_without_normals_will_do_and_progress_is_told():
 def test_spirals_and_contours_leave_no_gaps_in_corners(trajectory):
     row = checked(trajectory=trajectory)
     stepover = row.process.distance_between_lines_m
-    assert row.measures.coverage > 0.95
-    assert row.measures.line_spacing_worst_m < 1.15 * stepover
+    assert row.metrics.coverage > 0.95
+    assert row.metrics.line_spacing_worst_m < 1.15 * stepover

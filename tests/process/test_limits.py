@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from builders.taught_box import MEASURES, made_up
+from builders.taught_box import METRICS, made_up
 from nrdf.process.limits import Limits, strict_warnings
 from nrdf.regions.presence import ABSENT, NOT_OBSERVED, Presence
 
@@ -34,21 +34,21 @@ def test_each_limit_is_met_or_says_by_how_much_it_is_not(limit, good, bad, messa
 
 
 def test_the_coverage_is_of_what_was_found_not_of_what_is_left_of_it():
-    left_out = {"no_room": 0.194, "edge_margin": 0.0}
-    measures = replace(MEASURES, coverage=0.806, left_out=left_out, unreached=0.0)
-    (line,) = Limits(min_coverage=0.95).broken(made_up(measures=measures))
+    left_out = {"no_clearance": 0.194, "edge_margin": 0.0}
+    metrics = replace(METRICS, coverage=0.806, left_out=left_out, unreached=0.0)
+    (line,) = Limits(min_coverage=0.95).broken(made_up(metrics=metrics))
     assert "is 0.806, below 0.95 (left out: 0.194, unreached: 0.000)" in line
 
 
 def test_the_distance_is_that_from_the_surface_planned_on_where_no_other_is_known():
-    measures = replace(MEASURES, true_distance_worst_m=None, judged_by=None)
-    assert Limits(max_surface_distance_m=0.001).broken(made_up(measures=measures)) == []
-    (line,) = Limits(max_surface_distance_m=0.0005).broken(made_up(measures=measures))
+    metrics = replace(METRICS, true_distance_worst_m=None, compared_with=None)
+    assert Limits(max_surface_distance_m=0.001).broken(made_up(metrics=metrics)) == []
+    (line,) = Limits(max_surface_distance_m=0.0005).broken(made_up(metrics=metrics))
     assert "from the surface planned on is 0.9 mm, above 0.5 mm" in line
 
 
 def test_no_limit_is_always_met():
-    assert Limits().broken(made_up(measures=replace(MEASURES, coverage=0.0))) == []
+    assert Limits().broken(made_up(metrics=replace(METRICS, coverage=0.0))) == []
 
 
 def test_what_has_no_path_counts_only_where_all_are_required():
@@ -59,7 +59,7 @@ def test_what_has_no_path_counts_only_where_all_are_required():
 
 
 def test_a_single_line_has_no_spacing_to_be_too_wide():
-    alone = made_up(measures=replace(MEASURES, line_spacing_worst_m=None))
+    alone = made_up(metrics=replace(METRICS, line_spacing_worst_m=None))
     assert Limits(max_line_spacing_m=0.001).broken(alone) == []
 
 

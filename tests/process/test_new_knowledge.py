@@ -37,7 +37,7 @@ def test_a_new_file_passes_the_check_once_its_placeholder_is_filled_in(files):
         read_bound_knowledge(path)
     (files / "top.ply").rename(files / f"{PLACEHOLDER}.ply")
     (row,) = check_knowledge(read_bound_knowledge(path))
-    assert row.fault == "" and row.measures.coverage > 0.9
+    assert row.fault == "" and row.metrics.coverage > 0.9
 
 
 @pytest.mark.parametrize("kind", KINDS)

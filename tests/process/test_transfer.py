@@ -104,7 +104,7 @@ def test_a_strategy_is_planned_anew_on_the_target(transferred):
     assert step.transfer_mode == "replan" and step.process.trajectory == "raster"
     positions = np.concatenate([segment.positions for segment in process_segments(step)])
     np.testing.assert_allclose(positions[:, 1], SIZE[1] / 2, atol=2e-3)
-    assert step.measures.coverage > 0.9
+    assert step.metrics.coverage > 0.9
     assert (step.path.process, step.path.tool_radius_m) == ("sand", 0.025)
     assert process_segments(step)[0].force_n == 10
 
@@ -144,7 +144,7 @@ def test_a_direction_is_in_the_targets_frame(model):
 def test_a_region_that_is_not_there_is_skipped_never_invented(model):
     taught = ProcessTransfer(bound_knowledge({"top": [SAND, OIL], "right": [SAND]}), model)
     result = taught.transfer(cloud(seed=1), min_confidence=1.0)
-    assert all(step.path is None and step.measures is None for step in result.paths)
+    assert all(step.path is None and step.metrics is None for step in result.paths)
     assert ", below 1" in result.regions["top"].missing
     assert len(result.warnings) == 2
     assert result.warnings[0].startswith("region 'top' is skipped: confidence ")
@@ -188,11 +188,11 @@ def test_paths_are_judged_by_the_mesh_that_was_given(model):
         .transfer(replace(target, mesh=mesh))
         .paths
     )
-    assert step.measures.judged_by == "the mesh as given (12 triangles)"
-    assert step.measures.surface_distance_99_m < 1e-3
-    assert step.measures.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
-    assert step.measures.true_distance_worst_m >= step.measures.true_distance_95_m
-    (warning,) = (w for w in measure_warnings(step.process, step.measures) if "as given" in w)
+    assert step.metrics.compared_with == "the mesh as given (12 triangles)"
+    assert step.metrics.surface_distance_99_m < 1e-3
+    assert step.metrics.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
+    assert step.metrics.true_distance_worst_m >= step.metrics.true_distance_95_m
+    (warning,) = (w for w in measure_warnings(step.process, step.metrics) if "as given" in w)
     assert re.match(r"1 % of the way on the surface is more than \d", warning)
 
 
@@ -204,13 +204,13 @@ def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
     whole = PointCloud(points, np.concatenate([target.normals] * 2))
     process = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
     (step,) = process.transfer(target, whole=whole).paths
-    assert step.measures.judged_by == f"all {2 * len(target)} points as given"
-    assert step.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+    assert step.metrics.compared_with == f"all {2 * len(target)} points as given"
+    assert step.metrics.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
     (alone,) = process.transfer(target).paths
-    assert alone.measures.judged_by == f"all {len(target)} points as given"
-    assert alone.measures.true_distance_95_m < 1e-3
+    assert alone.metrics.compared_with == f"all {len(target)} points as given"
+    assert alone.metrics.true_distance_95_m < 1e-3
     (bare,) = process.transfer(target, whole=PointCloud(points)).paths  # without normals
-    assert bare.measures.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
+    assert bare.metrics.true_distance_95_m == pytest.approx(4e-3, abs=5e-4)
 
 
 def test_a_warped_step_that_grew_is_reported(model, monkeypatch):
@@ -245,7 +245,7 @@ def test_normals_are_estimated_for_all_points_and_kept(model):
     )
     facing = np.einsum("na,na->n", result.target.normals, whole.normals)
     assert np.quantile(facing, 0.2) > 0.9
-    assert result.paths[0].measures.coverage > 0.9
+    assert result.paths[0].metrics.coverage > 0.9
 
 
 def test_a_target_in_another_unit_is_brought_to_metres(model):
@@ -278,4 +278,4 @@ def test_taught_spots_are_warped_one_by_one(model):
     taught = bound_knowledge({"front": [{**TAUGHT, "waypoints": spots, "dwell_s": 2.0}]})
     step = ProcessTransfer(taught, model).transfer(cloud(seed=1)).paths[0]
     assert step.reason == "" and [len(s.positions) for s in process_segments(step)] == [1, 1, 1]
-    assert step.measures.cycle_time_s > 6.0
+    assert step.metrics.cycle_time_s > 6.0

@@ -104,7 +104,7 @@ def test_the_targets_knowledge_is_as_good_as_the_taught_one(folder, transferred)
     checked = check_knowledge(again)
     assert [row.fault for row in checked] == ["", "", ""]
     for row, step in zip(checked, transferred.paths, strict=True):
-        assert row.measures.coverage == pytest.approx(step.measures.coverage, abs=0.03)
+        assert row.metrics.coverage == pytest.approx(step.metrics.coverage, abs=0.03)
 
 
 def test_the_target_is_in_metres(folder):

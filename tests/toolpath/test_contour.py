@@ -20,8 +20,8 @@ def disc(radius: float = 0.2) -> Patch:
     return patches_of(surface, np.arange(surface.size))[0]
 
 
-def length(stroke: np.ndarray) -> float:
-    return float(np.linalg.norm(np.diff(stroke, axis=0), axis=1).sum())
+def length(path: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def area(ring: np.ndarray) -> float:
@@ -43,22 +43,22 @@ def test_rings_on_a_disc_are_closed_even_and_nested():
 
 def test_the_margin_is_kept():
     patch = disc()
-    for strokes in (contour(patch, STEP, 0.04), spiral(patch, STEP, 0.04)):
-        places = np.concatenate([stroke for block in strokes for stroke in block])
+    for paths in (contour(patch, STEP, 0.04), spiral(patch, STEP, 0.04)):
+        places = np.concatenate([path for block in paths for path in block])
         assert patch.border.distance(places).min() > 0.04
 
 
 def test_a_spiral_on_a_disc_is_one_stroke_that_sinks_by_a_stepover_a_turn():
     patch = disc()
-    ((stroke,),) = spiral(patch, STEP, 0.0)
-    depth = patch.border.distance(stroke)
+    ((path,),) = spiral(patch, STEP, 0.0)
+    depth = patch.border.distance(path)
     centre = patch.uv.mean(axis=0)
-    turns = np.unwrap(np.arctan2(*(stroke - centre).T[::-1])) / (2 * np.pi)
+    turns = np.unwrap(np.arctan2(*(path - centre).T[::-1])) / (2 * np.pi)
     assert np.ptp(turns) == pytest.approx(9, abs=0.5)  # 8 rings, the first and last whole
     assert depth[-5:].mean() > depth[:5].mean() + 6 * STEP
     sunk = np.interp(np.arange(1.0, 8.0), np.abs(turns - turns[0]), depth)
     np.testing.assert_allclose(np.diff(sunk), STEP, atol=0.012)
-    steps = np.linalg.norm(np.diff(stroke, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     assert steps.max() < 2 * STEP
 
 
@@ -77,7 +77,7 @@ def test_where_rings_part_each_branch_has_a_spiral():
     neck = (np.abs(points[:, 0] - 0.2) < 0.05) & (np.abs(points[:, 1] - 0.15) > 0.05)
     surface = Surface(points[~neck], normals[~neck])
     (patch,) = patches_of(surface, np.arange(surface.size))
-    (strokes,) = spiral(patch, STEP, 0.0)
-    assert len(strokes) >= 3
-    long_ones = sorted(map(length, strokes))[-2:]
+    (paths,) = spiral(patch, STEP, 0.0)
+    assert len(paths) >= 3
+    long_ones = sorted(map(length, paths))[-2:]
     assert long_ones[0] > 0.8

@@ -15,8 +15,8 @@ def patch_of(points: np.ndarray, normals: np.ndarray) -> Patch:
     return patches_of(Surface(points, normals), np.arange(len(points)))[0]
 
 
-def placed(patch: Patch, strokes: list[np.ndarray]) -> list[np.ndarray]:
-    return [patch.at(stroke)[0] for stroke in strokes]
+def placed(patch: Patch, paths: list[np.ndarray]) -> list[np.ndarray]:
+    return [patch.at(path)[0] for path in paths]
 
 
 @pytest.mark.parametrize(
@@ -30,8 +30,8 @@ def test_strips_are_even_and_no_wider_than_a_stepover(width, middles):
 def test_a_board_has_the_exact_number_of_lines_in_snake_order():
     patch = patch_of(*board(length=0.4, width=0.3, spacing=0.008))
     angle, _ = patch.angle_of(np.array([1.0, 0.0, 0.0]))
-    (strokes,) = raster(patch, angle, 0.032, 0.0)
-    lines = placed(patch, strokes)
+    (paths,) = raster(patch, angle, 0.032, 0.0)
+    lines = placed(patch, paths)
     assert len(lines) == 10
     levels = [line[:, 1].mean() for line in lines]
     np.testing.assert_allclose(np.abs(np.diff(levels)), 0.03, atol=0.0015)
@@ -46,8 +46,8 @@ def test_a_board_has_the_exact_number_of_lines_in_snake_order():
 def test_lines_are_broken_at_a_gap():
     patch = patch_of(*slats(gap=0.06))
     angle, _ = patch.angle_of(np.array([1.0, 0.0, 0.0]))
-    (strokes,) = raster(patch, angle, 0.03, 0.0)
-    lines = placed(patch, strokes)
+    (paths,) = raster(patch, angle, 0.03, 0.0)
+    lines = placed(patch, paths)
     assert len(lines) > 11
     for line in lines:
         through = (np.abs(line[:, 0] - 0.2) < 0.02) & (np.abs(line[:, 1] - 0.15) < 0.08)
@@ -66,8 +66,8 @@ def test_parts_that_a_margin_separates_have_blocks_of_their_own():
 def test_around_a_bend_lines_are_even_along_the_surface():
     patch = patch_of(*tube(radius=0.1, turn=np.pi))
     angle, _ = patch.angle_of(np.array([0.0, 0.0, 1.0]))
-    (strokes,) = raster(patch, angle, 0.03, 0.0)
-    around = [np.arctan2(line[:, 1], line[:, 0]).mean() for line in placed(patch, strokes)]
+    (paths,) = raster(patch, angle, 0.03, 0.0)
+    around = [np.arctan2(line[:, 1], line[:, 0]).mean() for line in placed(patch, paths)]
     assert len(around) == 11
     np.testing.assert_allclose(np.abs(np.diff(around)) * 0.1, np.pi * 0.1 / 11, rtol=0.08)
 

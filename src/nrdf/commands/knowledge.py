@@ -172,9 +172,9 @@ def _show_planned(checked: list[CheckedProcess], points: dict[str, int]) -> None
 
     shown = table("\nplanned on the reference", "region", "points", *SHORT_METRIC_COLUMNS)
     for row in checked:
-        missing = row.measures is None
+        missing = row.metrics is None
         cells = (
-            ["–"] * len(SHORT_METRIC_COLUMNS) if missing else short_metric_cells(vars(row.measures))
+            ["–"] * len(SHORT_METRIC_COLUMNS) if missing else short_metric_cells(vars(row.metrics))
         )
         shown.add_row(row.region, str(points[row.region]), *cells)
     show(shown)

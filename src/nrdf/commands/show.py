@@ -247,9 +247,9 @@ def _taught_panel(title: str, teacher: ProcessTransfer) -> Panel:
 def _compare(chair: str, transferred: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:
     rows = []
     for step in transferred.paths:
-        match, measures = transferred.regions[step.region].match, step.measures
+        match, metrics = transferred.regions[step.region].match, step.metrics
         true = truth.get(step.region)
-        off = None if measures is None or truth else measures.true_distance_99_m
+        off = None if metrics is None or truth else metrics.true_distance_99_m
         rows.append(
             Found(
                 chair=chair,
@@ -259,8 +259,8 @@ def _compare(chair: str, transferred: TransferResult, truth: dict[str, np.ndarra
                 true=None if true is None else int(true.sum()),
                 iou=None if true is None else round(overlap(match.indices, true), 4),
                 confidence=round(match.score, 4),
-                coverage=None if measures is None else round(measures.coverage, 4),
-                cycle_time_s=None if measures is None else round(measures.cycle_time_s, 1),
+                coverage=None if metrics is None else round(metrics.coverage, 4),
+                cycle_time_s=None if metrics is None else round(metrics.cycle_time_s, 1),
                 true_distance_99_m=None if off is None else round(off, 6),
             )
         )

@@ -187,7 +187,7 @@ def show_transfer(report: dict[str, Any]) -> None:
     shown = table("", "region", "process", "sure", *SHORT_METRIC_COLUMNS, texts=2)
     for path in report["paths"]:
         confidence = f"{report['regions'][path['region']]['confidence']:.2f}"
-        cells = short_metric_cells(path["measures"]) if path["planned"] else none
+        cells = short_metric_cells(path["metrics"]) if path["planned"] else none
         style = None if path["planned"] else "dim"
         shown.add_row(path["region"], path["process"], confidence, *cells, style=style)
     longest = max((len(path["region"]) for path in report["paths"]), default=0)

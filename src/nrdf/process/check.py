@@ -22,7 +22,7 @@ from nrdf.process.taught_paths import normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import Measures, measure
+from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
 from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.types import Segment
 
@@ -32,14 +32,14 @@ class CheckedProcess:
     """A process planned on its region of the reference.
 
     fault: why it cannot be done, or "". warnings: what a person should look at. segments and
-    measures: of its tool path, none where it cannot be done.
+    metrics: of its tool path, none where it cannot be done.
     """
 
     region: str
     process: Process
     fault: str = ""
     warnings: tuple[str, ...] = ()
-    measures: Measures | None = None
+    metrics: ToolPathMetrics | None = None
     segments: tuple[Segment, ...] = ()
 
     @property
@@ -98,11 +98,11 @@ def check_process(
         else:
             taught = taught_segments(process, surface)
             segments = add_approach_retract(taught, normals_under(surface, taught), strategy)
-        measures = measure(surface, region, strategy, segments, given)
+        metrics = measure_path(surface, region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))
-    warnings += measure_warnings(process, measures)
-    return CheckedProcess(name, process, "", tuple(warnings), measures, tuple(segments))
+    warnings += measure_warnings(process, metrics)
+    return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments))
 
 
 def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:

@@ -8,7 +8,7 @@ from nrdf.geometry.units import in_words
 from nrdf.io.bounds import FRACTION, NON_NEGATIVE
 from nrdf.process.transfer_result import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
-from nrdf.toolpath.metrics import Measures
+from nrdf.toolpath.metrics import ToolPathMetrics
 
 LOW_CONFIDENCE = 0.4
 """A region found with less confidence than this gets a warning."""
@@ -73,35 +73,35 @@ class Limits:
             lines += [f"{w} (--any-kind: take it all the same)" for w in result.kind.warnings]
         for step in result.paths:
             where = f"region '{step.region}', {step.process.label}"
-            if step.measures is None:
+            if step.metrics is None:
                 lines += [f"{where}: there is no tool path: {step.reason}"] * self.require_all
             else:
-                lines += [f"{where}: {what}" for what in self._broken_by(step.measures)]
-        total = sum(step.measures.cycle_time_s for step in result.paths if step.measures)
+                lines += [f"{where}: {what}" for what in self._broken_by(step.metrics)]
+        total = sum(step.metrics.cycle_time_s for step in result.paths if step.metrics)
         if self.max_cycle_time_s is not None and total > self.max_cycle_time_s:
             lines.append(f"the cycle time is {total:.1f} s, above {self.max_cycle_time_s:g} s")
         return lines
 
-    def _broken_by(self, measures: Measures) -> list[str]:
+    def _broken_by(self, metrics: ToolPathMetrics) -> list[str]:
         lines = []
-        if self.min_coverage is not None and measures.coverage < self.min_coverage:
+        if self.min_coverage is not None and metrics.coverage < self.min_coverage:
             lines.append(
-                f"the coverage of the whole region is {measures.coverage:.3f}, below "
-                f"{self.min_coverage:g} (left out: {sum(measures.left_out.values()):.3f}, "
-                f"unreached: {measures.unreached:.3f})"
+                f"the coverage of the whole region is {metrics.coverage:.3f}, below "
+                f"{self.min_coverage:g} (left out: {sum(metrics.left_out.values()):.3f}, "
+                f"unreached: {metrics.unreached:.3f})"
             )
-        off, from_what = measures.true_distance_worst_m, measures.judged_by
+        off, from_what = metrics.true_distance_worst_m, metrics.compared_with
         if off is None:
-            off, from_what = measures.surface_distance_worst_m, "the surface planned on"
+            off, from_what = metrics.surface_distance_worst_m, "the surface planned on"
         for what, name, value, limit in (
-            ("worst line spacing", "spacing_m", measures.line_spacing_worst_m,
+            ("worst line spacing", "spacing_m", metrics.line_spacing_worst_m,
              self.max_line_spacing_m),
             (f"worst distance from {from_what}", "distance_m", off, self.max_surface_distance_m),
-            ("tool axis' error (99th percentile)", "error_rad", measures.axis_error_99_rad,
+            ("tool axis' error (99th percentile)", "error_rad", metrics.axis_error_99_rad,
              self.max_axis_error_rad),
-            ("largest step between waypoints", "step_m", measures.step_worst_m, self.max_step_m),
+            ("largest step between waypoints", "step_m", metrics.step_worst_m, self.max_step_m),
             ("largest turn of the tool's axis between waypoints", "turn_rad",
-             measures.turn_worst_rad, self.max_turn_rad),
+             metrics.turn_worst_rad, self.max_turn_rad),
         ):  # fmt: skip
             if limit is not None and value is not None and value > limit:
                 said = f"{in_words(name, value)}, above {in_words(name, limit)}"

@@ -1,4 +1,4 @@
-"""Warnings about a planned tool path, from its measures."""
+"""Warnings about a planned tool path, from its metrics."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from nrdf.geometry.units import in_words
 from nrdf.process.knowledge import Process
-from nrdf.toolpath.metrics import NO_ROOM, Measures
+from nrdf.toolpath.metrics import NO_CLEARANCE, ToolPathMetrics
 
 _MOST_UNREACHED = 0.03
 _LARGEST_STEP = 2.0  # times the spacing of waypoints
@@ -16,45 +16,45 @@ _FARTHEST_M = 0.001
 _STEEPEST_RAD = np.radians(5.0)
 
 
-def measure_warnings(process: Process, measures: Measures) -> list[str]:
+def measure_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     """What a person should look at before a path is driven."""
     lines = []
-    if measures.left_out[NO_ROOM] > 0.0:
-        room = in_words("clearance_m", process.tool.clearance_m)
+    if metrics.left_out[NO_CLEARANCE] > 0.0:
+        clearance = in_words("clearance_m", process.tool.clearance_m)
         lines.append(
-            f"{measures.left_out[NO_ROOM]:.1%} of the region has less than {room} free before it, "
-            "and is left out"
+            f"{metrics.left_out[NO_CLEARANCE]:.1%} of the region has less than {clearance} free "
+            "before it, and is left out"
         )
-    if measures.unreached > _MOST_UNREACHED:
+    if metrics.unreached > _MOST_UNREACHED:
         lines.append(
-            f"the tool does not reach {measures.unreached:.1%} of the region, beside what is left "
+            f"the tool does not reach {metrics.unreached:.1%} of the region, beside what is left "
             "out"
         )
-    worst, stepover = measures.line_spacing_worst_m, process.distance_between_lines_m
+    worst, stepover = metrics.line_spacing_worst_m, process.distance_between_lines_m
     if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
         lines.append(
             f"lines are up to {in_words('spacing_m', worst)} apart; "
             f"{in_words('stepover_m', stepover)} were asked for"
         )
-    if process.trajectory != "taught" and measures.step_worst_m > _LARGEST_STEP * process.spacing_m:
-        step, asked = (in_words("_m", x) for x in (measures.step_worst_m, process.spacing_m))
+    if process.trajectory != "taught" and metrics.step_worst_m > _LARGEST_STEP * process.spacing_m:
+        step, asked = (in_words("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
         lines.append(f"a step of {step} between neighbouring waypoints; {asked} were asked for")
-    if measures.turn_worst_rad > _LARGEST_TURN_RAD:
-        turn = in_words("_rad", measures.turn_worst_rad)
+    if metrics.turn_worst_rad > _LARGEST_TURN_RAD:
+        turn = in_words("_rad", metrics.turn_worst_rad)
         lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
-    lines += _distance_warnings(process, measures)
-    if measures.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
-        error = in_words("error_rad", measures.axis_error_99_rad)
+    lines += _distance_warnings(process, metrics)
+    if metrics.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
+        error = in_words("error_rad", metrics.axis_error_99_rad)
         lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
     return lines
 
 
-def _distance_warnings(process: Process, measures: Measures) -> list[str]:
-    """By the object as it was given, where that is known: the plan cannot judge itself."""
-    planned, true = measures.surface_distance_99_m, measures.true_distance_99_m
-    if true is not None and true > max(_FARTHEST_M, measures.resolution_m or 0.0):
+def _distance_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
+    """By the object as it was given where that is known, else by the surface planned on."""
+    planned, true = metrics.surface_distance_99_m, metrics.true_distance_99_m
+    if true is not None and true > max(_FARTHEST_M, metrics.resolution_m or 0.0):
         away = in_words("_m", true)
-        return [f"1 % of the way on the surface is more than {away} off {measures.judged_by}"]
+        return [f"1 % of the way on the surface is more than {away} off {metrics.compared_with}"]
     if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
         away = in_words("_m", planned)
         return [f"1 % of the waypoints are more than {away} off the surface planned on"]

@@ -12,7 +12,7 @@ from nrdf.geometry.units import in_words
 from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.frames import tool_quaternions, travel_of
+from nrdf.toolpath.frames import tool_quaternions, travel_directions
 from nrdf.toolpath.types import Segment
 
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
@@ -59,7 +59,7 @@ def _quaternions(
     nearest = surface.tree.query(positions)[1]
     normals = surface.project(surface.points[nearest], surface.normals[nearest])[1]
     if len(positions) > 1:
-        travel = travel_of(positions, _SMOOTH * surface.spacing)
+        travel = travel_directions(positions, _SMOOTH * surface.spacing)
     else:
         travel = np.array([process.direction or (1.0, 0.0, 0.0)])
     return tool_quaternions(travel, normals, process.lead_rad, process.tilt_rad)

@@ -52,7 +52,7 @@ from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind_check import KindCheck
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
-from nrdf.toolpath.metrics import measure
+from nrdf.toolpath.metrics import measure_path
 from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.types import Segment
 
@@ -242,11 +242,11 @@ class ProcessTransfer:
                 segments = plan(surface, inside, strategy)
             else:
                 process, segments, warnings = self._warp(region, number, process, correspondence)
-            measures = measure(surface, inside, strategy, segments, given)
+            metrics = measure_path(surface, inside, strategy, segments, given)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)
-        return replace(made, process=process, path=path, measures=measures, warnings=warnings)
+        return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
 
     def _warp(
         self, region: str, number: int, process: Process, correspondence: Correspondence

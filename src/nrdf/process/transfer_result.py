@@ -10,7 +10,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process, TransferMode
 from nrdf.regions.match import Match
 from nrdf.scans.kind_check import KindCheck
-from nrdf.toolpath.metrics import Measures
+from nrdf.toolpath.metrics import ToolPathMetrics
 from nrdf.toolpath.types import ToolPath
 
 MIN_CONFIDENCE = 0.25
@@ -32,7 +32,7 @@ class PathResult:
 
     number: which of the region's processes, from 0. process: as it is on the target (its direction,
     or its warped waypoints, in the target's frame). transfer_mode: how it came there: "replan" or
-    "warp". path, measures: None where there is no path, for the `reason`.
+    "warp". path, metrics: None where there is no path, for the `reason`.
     """
 
     region: str
@@ -40,7 +40,7 @@ class PathResult:
     process: Process
     transfer_mode: TransferMode
     path: ToolPath | None = None
-    measures: Measures | None = None
+    metrics: ToolPathMetrics | None = None
     warnings: tuple[str, ...] = ()
     reason: str = ""
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from nrdf.geometry.polylines import step_lengths
 from nrdf.process.correspondence import Correspondence
 from nrdf.process.taught_paths import surface_under
-from nrdf.toolpath.frames import surface_frames, travel_of
+from nrdf.toolpath.frames import surface_frames, travel_directions
 from nrdf.toolpath.types import Segment
 
 _TORN, _GAP = 1.5, 1.2  # times its length on the reference, and spacings, that a step may have
@@ -91,7 +91,7 @@ def _frames(
     """Frames (n, 3, 3) of travel and normal along a line; `alone` (n, 3) is the travel where the
     line does not move."""
     moves = len(points) > 1 and float(np.ptp(points, axis=0).max()) > 0.5 * spacing
-    travel = travel_of(points, _SMOOTH * spacing) if moves else alone
+    travel = travel_directions(points, _SMOOTH * spacing) if moves else alone
     return surface_frames(travel, normals)
 
 

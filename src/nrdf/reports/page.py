@@ -101,7 +101,7 @@ def _cards(report: Mapping[str, Any]) -> str:
     total, regions = report["total"], report["regions"]
     found = sum(region["found"] for region in regions.values())
     minutes, seconds = divmod(round(total["cycle_time_s"]), 60)
-    covered = [p["measures"]["coverage"] for p in report["paths"] if p["planned"]]
+    covered = [p["metrics"]["coverage"] for p in report["paths"] if p["planned"]]
     shown = (
         (f"{found} of {len(regions)}", "regions found"),
         (f"{total['paths']} of {total['paths'] + total['skipped']}", "tool paths"),
@@ -151,7 +151,7 @@ def _table(report: Mapping[str, Any], colours: Mapping[str, str]) -> str:
                 f'<tr class="none">{first}<td class="text" colspan="{span}">{why}</td></tr>'
             )
             continue
-        cells = "".join(f"<td>{cell}</td>" for cell in metric_cells(path["measures"]))
+        cells = "".join(f"<td>{cell}</td>" for cell in metric_cells(path["metrics"]))
         rows.append(f"<tr>{first}{cells}</tr>")
     table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
     return f'<div class="wide"><table>{table}</table></div>'
@@ -194,10 +194,10 @@ def _said(path: Mapping[str, Any]) -> list[tuple[str, str]]:
          f"{quantity('lead_rad')}, {quantity('tilt_rad')}, {quantity('standoff_m')}"),
         ("force, feed", f"{quantity('force_n')}, {quantity('feed_m_s')}"),
     ]  # fmt: skip
-    measures = path["measures"]
-    lines.append(("left out of the region", left_out_in_words(measures["left_out"])))
-    if measures["judged_by"] is not None:
-        lines.append(("judged by", measures["judged_by"]))
+    metrics = path["metrics"]
+    lines.append(("left out of the region", left_out_in_words(metrics["left_out"])))
+    if metrics["compared_with"] is not None:
+        lines.append(("compared with", metrics["compared_with"]))
     if requested.get("spindle_rad_s") is not None:
         lines.append(("spindle", quantity("spindle_rad_s")))
     if direction is not None:

@@ -31,7 +31,7 @@ def report_of(result: TransferResult, limits: Limits) -> dict[str, Any]:
     """Everything of a transfer that a report says, as plain values; lengths in metres."""
     regions = result.regions
     paths = [_path(step, bool(regions[step.region].missing)) for step in result.paths]
-    driven = [step.measures for step in result.paths if step.measures is not None]
+    driven = [step.metrics for step in result.paths if step.metrics is not None]
     strict = strict_warnings(result)
     # A skipped region is warned about as such.
     skipped = tuple(f"region '{name}':" for name, r in regions.items() if r.missing)
@@ -96,12 +96,12 @@ def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
         "requested": _requested(process),
         "warnings": [*step.warnings],
     }
-    if step.path is not None and step.measures is not None:
+    if step.path is not None and step.metrics is not None:
         process_segments = [s for s in step.path.segments if s.kind == "process"]
         content["lines"] = len({segment.line for segment in process_segments})
         content["waypoints"] = sum(len(segment.positions) for segment in step.path.segments)
-        content["measures"] = vars(step.measures)
-        content["warnings"] += measure_warnings(process, step.measures)
+        content["metrics"] = vars(step.metrics)
+        content["warnings"] += measure_warnings(process, step.metrics)
     elif not skipped:
         content["warnings"].append(f"no tool path: {step.reason}")
     return content
@@ -120,38 +120,38 @@ def left_out_in_words(left_out: Mapping[str, float]) -> str:
     return ", ".join(shares) or "–"
 
 
-def shares_in_words(measures: Mapping[str, Any]) -> str:
+def shares_in_words(metrics: Mapping[str, Any]) -> str:
     """What is worked, left out and not reached of a whole region, in per cent."""
-    left_out = sum(measures["left_out"].values())
-    shares = (measures["coverage"], left_out, measures["unreached"])
+    left_out = sum(metrics["left_out"].values())
+    shares = (metrics["coverage"], left_out, metrics["unreached"])
     return " · ".join(f"{100.0 * share:.1f}" for share in shares) + " %"
 
 
-def jump_in_words(measures: Mapping[str, Any]) -> str:
+def jump_in_words(metrics: Mapping[str, Any]) -> str:
     """The largest step between neighbouring waypoints, and the largest turn."""
-    turn = f"{np.degrees(measures['turn_worst_rad']):.0f}°"
-    return f"{_millimetres(measures['step_worst_m'])} · {turn}"
+    turn = f"{np.degrees(metrics['turn_worst_rad']):.0f}°"
+    return f"{_millimetres(metrics['step_worst_m'])} · {turn}"
 
 
-def metric_cells(measures: Mapping[str, Any]) -> list[str]:
-    """A tool path's measures as people read them, one for each of `METRIC_COLUMNS`."""
-    length, time = f"{measures['process_length_m']:.2f} m", f"{measures['cycle_time_s']:.0f} s"
-    spacing = _millimetres(measures["line_spacing_mean_m"], measures["line_spacing_worst_m"])
-    true = _millimetres(measures["true_distance_95_m"], measures["true_distance_worst_m"])
-    away = _millimetres(measures["surface_distance_99_m"], measures["surface_distance_worst_m"])
-    shares, overlap = shares_in_words(measures), f"{measures['overlap']:.0%}"
-    axis = f"{np.degrees(measures['axis_error_99_rad']):.1f}°"
-    jump = jump_in_words(measures)
-    jump += f" · {np.degrees(measures['bend_worst_rad_m']) / 1e3:.1f}°/mm"
+def metric_cells(metrics: Mapping[str, Any]) -> list[str]:
+    """A tool path's metrics as people read them, one for each of `METRIC_COLUMNS`."""
+    length, time = f"{metrics['process_length_m']:.2f} m", f"{metrics['cycle_time_s']:.0f} s"
+    spacing = _millimetres(metrics["line_spacing_mean_m"], metrics["line_spacing_worst_m"])
+    true = _millimetres(metrics["true_distance_95_m"], metrics["true_distance_worst_m"])
+    away = _millimetres(metrics["surface_distance_99_m"], metrics["surface_distance_worst_m"])
+    shares, overlap = shares_in_words(metrics), f"{metrics['overlap']:.0%}"
+    axis = f"{np.degrees(metrics['axis_error_99_rad']):.1f}°"
+    jump = jump_in_words(metrics)
+    jump += f" · {np.degrees(metrics['bend_worst_rad_m']) / 1e3:.1f}°/mm"
     return [shares, overlap, spacing, jump, true, away, axis, length, time]
 
 
-def short_metric_cells(measures: Mapping[str, Any]) -> list[str]:
-    """The measures that a terminal has room for, one for each of `SHORT_METRIC_COLUMNS`."""
-    shares = shares_in_words(measures).removesuffix(" %").split(" · ")
+def short_metric_cells(metrics: Mapping[str, Any]) -> list[str]:
+    """The metrics that a terminal has room for, one for each of `SHORT_METRIC_COLUMNS`."""
+    shares = shares_in_words(metrics).removesuffix(" %").split(" · ")
     lengths = ("line_spacing_worst_m", "step_worst_m", "true_distance_95_m")
-    spacing, step, off = (_millimetres(measures[name]).removesuffix(" mm") for name in lengths)
-    turn, time = np.degrees(measures["turn_worst_rad"]), measures["cycle_time_s"]
+    spacing, step, off = (_millimetres(metrics[name]).removesuffix(" mm") for name in lengths)
+    turn, time = np.degrees(metrics["turn_worst_rad"]), metrics["cycle_time_s"]
     return [*shares, spacing, step, f"{turn:.0f}", off, f"{time:.0f}"]
 
 

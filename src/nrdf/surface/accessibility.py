@@ -1,4 +1,4 @@
-"""Which places of a region a tool has room in front of."""
+"""Which points of a region a tool can access: its clearance is free before the surface there."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _STEP_M, _MOST_STEPS = 0.005, 200
 _INSIDE = 0.5  # winding number
 
 
-def with_room(surface: Surface, region: np.ndarray, clearance_m: float) -> np.ndarray:
+def accessible_points(surface: Surface, region: np.ndarray, clearance_m: float) -> np.ndarray:
     """The points of a region, indices (k,) of the surface's cloud, with nothing close before them.
 
     Along its normal, up to `clearance_m` away, a point must meet only what is outside of the

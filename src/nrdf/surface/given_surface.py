@@ -1,7 +1,7 @@
-"""The object as the user gave it, which tool paths are judged by: a mesh, or all of its points.
+"""The object as the user gave it, which tool paths are compared with: a mesh, or all points.
 
-Paths are planned on a surface that is fitted to some of the object's points. Judged by that alone,
-what is wrong with it would not be seen.
+Paths are planned on a surface that is fitted to some of the object's points. Compared with that
+alone, its own errors would not be seen.
 """
 
 from __future__ import annotations

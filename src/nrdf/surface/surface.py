@@ -93,7 +93,7 @@ class Surface:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """Neighbours (e, 2) on one sheet, each pair once, the lower index first.
+        """LineNeighbours (e, 2) on one sheet, each pair once, the lower index first.
 
         Pairs that lean out of each other's tangent plane, or whose normals differ much, are left
         out, so that no edge leads through a thin part.

@@ -9,12 +9,13 @@ from scipy.spatial import cKDTree
 from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.grid import Grid
 from nrdf.surface.patch import Patch
-from nrdf.toolpath.raster import Stroke, strip_middles
+from nrdf.toolpath.raster import strip_middles
+from nrdf.toolpath.surface_path import PlanarPath
 
 _ROUND = 0.4  # of the stepover: how far corners are rounded
 
 
-def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
+def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[PlanarPath]]:
     """Closed rings at even distances from a patch's border, from the outside in.
 
     One list for each connected part of the patch inside its margin. Each ring starts where the one
@@ -22,7 +23,7 @@ def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Strok
     """
     parts = []
     for rings, _, _ in _rings(patch, stepover_m, margin_m):
-        ordered: list[Stroke] = []
+        ordered: list[PlanarPath] = []
         end = rings[0][0][0]
         for level in rings:
             waiting = list(level)
@@ -34,8 +35,8 @@ def contour(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Strok
     return parts
 
 
-def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
-    """Spirals from a patch's border inwards, one stroke for each chain of nested rings.
+def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[PlanarPath]]:
+    """Spirals from a patch's border inwards, one path for each chain of nested rings.
 
     The first ring is followed whole, then each turn leads from one ring to the next inside it, and
     the innermost is followed whole. Where rings split, each branch has a spiral of its own.
@@ -43,18 +44,18 @@ def spiral(patch: Patch, stepover_m: float, margin_m: float) -> list[list[Stroke
     parts = []
     for rings, grid, depth in _rings(patch, stepover_m, margin_m):
         slope = np.stack(np.gradient(depth, grid.pitch)[::-1], axis=-1)
-        strokes, end = [], rings[0][0][0]
+        paths, end = [], rings[0][0][0]
         for chain in _chains(rings, stepover_m):
             # Turns that cannot sink any further on a ridge are straightened out.
-            strokes.append(_smooth(_wound(chain, grid, depth, slope, end), _ROUND * stepover_m))
-            end = strokes[-1][-1]
-        parts.append(strokes)
+            paths.append(_smooth(_wound(chain, grid, depth, slope, end), _ROUND * stepover_m))
+            end = paths[-1][-1]
+        parts.append(paths)
     return parts
 
 
 def _rings(
     patch: Patch, stepover: float, margin: float
-) -> list[tuple[list[list[Stroke]], Grid, np.ndarray]]:
+) -> list[tuple[list[list[PlanarPath]], Grid, np.ndarray]]:
     """For each part: rings by level from outside in, closed, anticlockwise; grid; depth on it."""
     grid = Grid.around(patch.uv, 0.5 * patch.spacing, 2.0 * patch.spacing)
     clear = patch.border.clearance(grid.nodes, margin)
@@ -78,13 +79,13 @@ def _rings(
     return found
 
 
-def _anticlockwise(ring: Stroke) -> Stroke:
+def _anticlockwise(ring: PlanarPath) -> PlanarPath:
     x, y = ring.T
     area = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
     return ring if area > 0.0 else ring[::-1]
 
 
-def _smooth(line: Stroke, reach: float) -> Stroke:
+def _smooth(line: PlanarPath, reach: float) -> PlanarPath:
     """A line with its corners, and what the ragged border has left in it, rounded; even steps."""
     length = arc_length(line)
     at = even_arc_lengths(float(length[-1]), 0.25 * reach, least=8)
@@ -97,18 +98,18 @@ def _smooth(line: Stroke, reach: float) -> Stroke:
     return ndimage.gaussian_filter1d(even, sigma, axis=0, mode="nearest")
 
 
-def _started_near(ring: Stroke, place: np.ndarray) -> Stroke:
+def _started_near(ring: PlanarPath, place: np.ndarray) -> PlanarPath:
     """A closed ring turned so that it begins, and ends, at its point nearest to `place` (2,)."""
     k = int(np.argmin(np.linalg.norm(ring[:-1] - place, axis=1)))
     turned = np.roll(ring[:-1], -k, axis=0)
     return np.concatenate([turned, turned[:1]])
 
 
-def _chains(rings: list[list[Stroke]], stepover: float) -> list[list[Stroke]]:
+def _chains(rings: list[list[PlanarPath]], stepover: float) -> list[list[PlanarPath]]:
     """Rings that lie one inside the other without a branch, each list from the outside in."""
-    chains: list[list[Stroke]] = []
+    chains: list[list[PlanarPath]] = []
     ends: list[int] = []  # the chain that each ring of the level before is the end of
-    before: list[Stroke] = []
+    before: list[PlanarPath] = []
     for level in rings:
         trees = [cKDTree(ring) for ring in before]
         parents = []
@@ -128,13 +129,13 @@ def _chains(rings: list[list[Stroke]], stepover: float) -> list[list[Stroke]]:
 
 
 def _wound(
-    chain: list[Stroke],
+    chain: list[PlanarPath],
     grid: Grid,
     depth: np.ndarray,
     slope: np.ndarray,
     end: np.ndarray,
-) -> Stroke:
-    """One stroke along a chain of rings, each turn sinking by a stepover."""
+) -> PlanarPath:
+    """One path along a chain of rings, each turn sinking by a stepover."""
     ring = _started_near(chain[0], end)
     pieces = [ring]
     for inner in chain[1:]:

@@ -1,4 +1,4 @@
-"""Tool frames on a surface: x along the travel, z into the part, leaned as asked for."""
+"""Tool frames on a surface: x along the travel, z into the part, tilted as asked for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from nrdf.geometry.frames import frames_from_z_and_x, unit_vectors, without_sign_jumps
 
 
-def travel_of(positions: np.ndarray, smooth_m: float = 0.0) -> np.ndarray:
+def travel_directions(positions: np.ndarray, smooth_m: float = 0.0) -> np.ndarray:
     """Unit directions of travel (n, 3) along positions (n, 3), m, n >= 2.
 
     Averaged over `smooth_m` of the way to either side, which takes the suddenness out of corners.
@@ -39,10 +39,10 @@ def surface_frames(travel: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return frames_from_z_and_x(-unit_vectors(normals), travel)
 
 
-def lean_rotation(lead_rad: float, tilt_rad: float) -> Rotation:
-    """The turn of a tool in its own upright frame that leans it: first by lead, then by tilt.
+def tilt_rotation(lead_rad: float, tilt_rad: float) -> Rotation:
+    """The rotation that tilts a tool in its own upright frame: first by lead, then by tilt.
 
-    A positive lead leans the tool's tail (the end away from the part) towards the travel, a
+    A positive lead tilts the tool's tail (the end away from the part) towards the travel, a
     positive tilt to its right; they turn about tool y by -lead and then about tool x by tilt.
     """
     return Rotation.from_euler("YX", [-lead_rad, tilt_rad])
@@ -51,9 +51,9 @@ def lean_rotation(lead_rad: float, tilt_rad: float) -> Rotation:
 def tool_quaternions(
     travel: np.ndarray, normals: np.ndarray, lead_rad: float = 0.0, tilt_rad: float = 0.0
 ) -> np.ndarray:
-    """Unit quaternions (n, 4), x y z w, of leaned tools, without jumps of sign.
+    """Unit quaternions (n, 4), x y z w, of tilted tools, without jumps of sign.
 
-    travel, normals: (n, 3), as for `surface_frames`; lead and tilt as for `lean_rotation`.
+    travel, normals: (n, 3), as for `surface_frames`; lead and tilt as for `tilt_rotation`.
     """
     upright = Rotation.from_matrix(surface_frames(travel, normals))
-    return without_sign_jumps((upright * lean_rotation(lead_rad, tilt_rad)).as_quat())
+    return without_sign_jumps((upright * tilt_rotation(lead_rad, tilt_rad)).as_quat())

@@ -1,4 +1,4 @@
-"""Short lines where a region's others leave something out: points, or a gap between two of them."""
+"""Gap filling: short lines over points that the others miss, and between lines too far apart."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from nrdf.geometry.frames import tangent_frames, unit_vectors
 from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.patch import Patch
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.sampled_path import Neighbours, Track, line_spacing, track_of
-from nrdf.toolpath.surface_path import Line, touching
+from nrdf.toolpath.sampled_path import LineNeighbours, SampledPath, line_spacing, sample_lines
+from nrdf.toolpath.surface_path import SurfacePath, find_contacts
 
-Way = tuple[np.ndarray, np.ndarray]
-"""Places (n, 3) near the surface, and the outward normals (n, 3) of its side there."""
+_Guide = tuple[np.ndarray, np.ndarray]
+"""Points (n, 3) near the surface, and the outward normals (n, 3) of its side there."""
 _NEARBY, _NEAR, _FACE = 2.0, 4.0, 3
 """Units (the tool's radius, or the points' spacing where that is more) from a line: points farther
 off than the first may not belong to the region, unless that many are a face of their own nearer
@@ -28,14 +28,14 @@ _NEXT = 1.5  # spacings between points that are next to each other
 _ROUNDS = 3
 
 
-def touch_up(
+def fill_missed_points(
     surface: Surface,
     wanted: np.ndarray,
-    lines: Sequence[Line],
+    lines: Sequence[SurfacePath],
     spacing_m: float,
     radius_m: float,
     stepover_m: float,
-) -> list[Line]:
+) -> list[SurfacePath]:
     """Lines over those of the points `wanted` (k,) that a tool does not reach along `lines`.
 
     The border of a region is ragged, and at its corners a few points may stand alone on a face of
@@ -45,42 +45,42 @@ def touch_up(
     stripes between lines that are wanted farther apart than the tool is wide.
     """
     reach, unit_m = max(radius_m, 0.55 * stepover_m), max(radius_m, surface.spacing)
-    made: list[Line] = []
+    made: list[SurfacePath] = []
     for _ in range(_ROUNDS):
-        track = track_of([*lines, *made], radius_m, stepover_m)
-        visits = track.visits(surface.points[wanted], surface.normals[wanted], reach)
-        left = wanted[visits == 0]
-        away = cKDTree(track.places).query(surface.points[left])[0]
+        sampled = sample_lines([*lines, *made], radius_m, stepover_m)
+        counts = sampled.coverage_count(surface.points[wanted], surface.normals[wanted], reach)
+        left = wanted[counts == 0]
+        away = cKDTree(sampled.places).query(surface.points[left])[0]
         left, away = left[away < _NEAR * unit_m], away[away < _NEAR * unit_m]
         nearby = set(left[away < _NEARBY * unit_m].tolist())
         groups = _groups(surface, left, max(radius_m, _NEXT * surface.spacing))
         groups = [g for g in groups if len(g) >= _FACE or not nearby.isdisjoint(g.tolist())]
-        ways = [_along(surface, group, spacing_m) for group in groups]
-        new = _lines(surface, ways, surface.spacing, radius_m)
+        guides = [_along(surface, group, spacing_m) for group in groups]
+        new = _lines(surface, guides, surface.spacing, radius_m)
         if not new:
             break
         made += new
     return made
 
 
-def fill_gaps(
+def fill_wide_gaps(
     surface: Surface,
     patches: Sequence[Patch],
-    lines: Sequence[Line],
+    lines: Sequence[SurfacePath],
     spacing_m: float,
     radius_m: float,
     stepover_m: float,
-) -> list[Line]:
+) -> list[SurfacePath]:
     """Lines half-way between those that are too far apart: beside breaks, and at patches' seams."""
-    made: list[Line] = []
+    made: list[SurfacePath] = []
     if not lines:
         return made
     tried: list[np.ndarray] = []
     for _ in range(_ROUNDS):
-        track = track_of([*lines, *made], radius_m, stepover_m)
-        beside = line_spacing(patches, track, stepover_m)
-        ways = _between(patches, track, beside, spacing_m, stepover_m, tried)
-        new = _lines(surface, ways, max(surface.spacing, 0.5 * stepover_m), radius_m)
+        sampled = sample_lines([*lines, *made], radius_m, stepover_m)
+        beside = line_spacing(patches, sampled, stepover_m)
+        guides = _between(patches, sampled, beside, spacing_m, stepover_m, tried)
+        new = _lines(surface, guides, max(surface.spacing, 0.5 * stepover_m), radius_m)
         if not new:
             break
         made += new
@@ -89,21 +89,21 @@ def fill_gaps(
 
 def _between(
     patches: Sequence[Patch],
-    track: Track,
-    neighbours: Neighbours,
+    sampled: SampledPath,
+    neighbours: LineNeighbours,
     spacing_m: float,
     stepover_m: float,
     tried: list[np.ndarray],
-) -> list[Way]:
-    """Ways through the middle of every gap that is too wide, apart from those `tried` before, to
+) -> list[_Guide]:
+    """Guides through the middle of every gap that is too wide, apart from those `tried` before, to
     which they are added."""
     wide = np.flatnonzero(neighbours.distance > _WIDE * stepover_m)
     wide = wide[np.argsort(neighbours.place[wide], kind="stable")]
     middle, normal = _on_patches(patches, neighbours.patch[wide], neighbours.middle[wide])
     place = neighbours.place[wide]
-    right = np.cross(track.travel[place], track.axes[place])
-    side = np.einsum("na,na->n", right, neighbours.beside[wide] - track.places[place]) > 0.0
-    ways: list[Way] = []
+    right = np.cross(sampled.travel[place], sampled.axes[place])
+    side = np.einsum("na,na->n", right, neighbours.beside[wide] - sampled.places[place]) > 0.0
+    guides: list[_Guide] = []
     for chosen in (np.flatnonzero(side), np.flatnonzero(~side)):
         ends = np.flatnonzero(np.diff(place[chosen]) > 2) + 1
         for run in np.split(chosen, ends):
@@ -115,19 +115,19 @@ def _between(
                 if np.median(seen) < 0.25 * stepover_m:
                     continue
             at = place[run]
-            longer = 0.5 * max(spacing_m - float(np.ptp(track.walked[at])), 0.0)
+            longer = 0.5 * max(spacing_m - float(np.ptp(sampled.arc_length[at])), 0.0)
             first, last = (
                 middle[run[[0, -1]]]
-                + longer * np.array([[-1.0], [1.0]]) * track.travel[at[[0, -1]]]
+                + longer * np.array([[-1.0], [1.0]]) * sampled.travel[at[[0, -1]]]
             )
             turned = normal[run[[0, *range(len(run)), -1]]]
             whole = np.concatenate([first[None], middle[run], last[None]])
             along = arc_length(whole)
             at_even = even_arc_lengths(float(along[-1]), spacing_m, nearest=True)
             way = interpolate(at_even, along, whole)
-            ways.append((way, unit_vectors(interpolate(at_even, along, turned))))
+            guides.append((way, unit_vectors(interpolate(at_even, along, turned))))
             tried.append(way)
-    return ways
+    return guides
 
 
 def _on_patches(
@@ -157,7 +157,7 @@ def _groups(surface: Surface, left: np.ndarray, near: float) -> list[np.ndarray]
     return [left[which == k] for k in range(count)]
 
 
-def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
+def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> _Guide:
     """A way along the longest extent of points (k,)."""
     points = surface.points[group]
     normal = unit_vectors(surface.normals[group].mean(axis=0))
@@ -174,13 +174,15 @@ def _along(surface: Surface, group: np.ndarray, spacing_m: float) -> Way:
     return way, np.broadcast_to(normal, way.shape)
 
 
-def _lines(surface: Surface, ways: Sequence[Way], near: float, radius_m: float) -> list[Line]:
-    """Ways brought onto the surface, those that have two waypoints there."""
-    if not ways:
+def _lines(
+    surface: Surface, guides: Sequence[_Guide], near: float, radius_m: float
+) -> list[SurfacePath]:
+    """Guides brought onto the surface, those that have two waypoints there."""
+    if not guides:
         return []
-    places = np.concatenate([way for way, _ in ways])
-    facing = np.concatenate([normals for _, normals in ways])
-    contacts, normals, there = touching(surface, places, facing, near, radius_m)
-    cuts = np.cumsum([len(way) for way, _ in ways])[:-1]
+    places = np.concatenate([way for way, _ in guides])
+    facing = np.concatenate([normals for _, normals in guides])
+    contacts, normals, there = find_contacts(surface, places, facing, near, radius_m)
+    cuts = np.cumsum([len(way) for way, _ in guides])[:-1]
     parts = zip(*(np.split(v, cuts) for v in (contacts, normals, there)), strict=True)
-    return [Line(c[t], n[t]) for c, n, t in parts if t.sum() > 1]
+    return [SurfacePath(c[t], n[t]) for c, n, t in parts if t.sum() > 1]

@@ -1,4 +1,4 @@
-"""How well a tool path works its region: the figures of the report."""
+"""How well a tool path works its region."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.polylines import step_lengths, total_length
-from nrdf.surface.accessibility import with_room
+from nrdf.surface.accessibility import accessible_points
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.frames import lean_rotation, surface_frames, travel_of
-from nrdf.toolpath.sampled_path import Track, line_spacing
+from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
+from nrdf.toolpath.sampled_path import SampledPath, line_spacing
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 
 _SHORTEST_M = 1e-3
-_JUDGED_M = 0.003  # between the places that are compared with the object as given
+_COMPARED_M = 0.003  # between the places that are compared with the object as given
 
-NO_ROOM, MARGIN = "no_room", "edge_margin"
-REASONS = {NO_ROOM: "no room for the tool", MARGIN: "edge margin"}
+NO_CLEARANCE, MARGIN = "no_clearance", "edge_margin"
+REASONS = {NO_CLEARANCE: "no clearance for the tool", MARGIN: "edge margin"}
 """Why a part of a region is left out, in words."""
 
 
@@ -31,8 +31,8 @@ REASONS = {NO_ROOM: "no room for the tool", MARGIN: "edge margin"}
 class Coverage:
     """What becomes of a whole region, in shares [0, 1] of its points that add up to 1.
 
-    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_room, where less than the
-    tool's clearance is free before the surface, whether the footprint brushes it or not, and
+    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_clearance, where less than
+    the tool's clearance is free before the surface, whether the footprint reaches it or not, and
     edge_margin, inside it and not reached. unreached: it should be worked, and is not.
     """
 
@@ -42,38 +42,43 @@ class Coverage:
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """A region as a strategy wants it worked. points: (k,) indices of the surface's points, all of
-    them; free (k,): those with room for the tool; inside (k,): those that are not in the margin."""
+class RegionPoints:
+    """Which of a region's points a strategy works.
+
+    points: (k,) indices of the surface's points, all of the region. accessible: (k,) whether the
+    tool has its clearance there. inside_margin: (k,) whether a point is not in the edge margin.
+    patches: of the accessible points.
+    """
 
     points: np.ndarray
-    free: np.ndarray
-    inside: np.ndarray
+    accessible: np.ndarray
+    inside_margin: np.ndarray
     patches: tuple[Patch, ...]
 
     @staticmethod
     def of(
         surface: Surface, region: np.ndarray, clearance_m: float, edge_margin_m: float
-    ) -> Wanted:
+    ) -> RegionPoints:
         """region: indices (k,) of the surface's points. Raises ProcessError as planning does."""
         points = surface.indices(region)
-        room = with_room(surface, region, clearance_m)
-        patches = patches_of(surface, room)
-        inside = inside_margin(surface, room, patches, edge_margin_m)
-        free = np.isin(points, surface.indices(room))
-        return Wanted(points, free, np.isin(points, inside), patches)
+        accessible = accessible_points(surface, region, clearance_m)
+        patches = patches_of(surface, accessible)
+        inside = inside_margin(surface, accessible, patches, edge_margin_m)
+        free = np.isin(points, surface.indices(accessible))
+        return RegionPoints(points, free, np.isin(points, inside), patches)
 
     def coverage(self, reached: np.ndarray) -> Coverage:
         """The shares, where a footprint reaches (k,) of the points."""
-        worked, margin = self.free & reached, self.free & ~self.inside & ~reached
-        left_out = {NO_ROOM: float((~self.free).mean()), MARGIN: float(margin.mean())}
-        missed = self.free & self.inside & ~reached
+        free, missed = self.accessible, self.accessible & ~reached
+        worked, margin = free & reached, missed & ~self.inside_margin
+        left_out = {NO_CLEARANCE: float((~free).mean()), MARGIN: float(margin.mean())}
+        missed = missed & self.inside_margin
         return Coverage(float(worked.mean()), left_out, float(missed.mean()))
 
 
 @dataclass(frozen=True)
-class Measures:
-    """Figures of one tool path on one region.
+class ToolPathMetrics:
+    """Metrics of one tool path on one region.
 
     coverage, left_out, unreached: shares of the whole region that was found, as a `Coverage` has
     them; overlap: share of what is worked that is reached more than once in a pass;
@@ -83,7 +88,7 @@ class Measures:
     surface_distance_*: of the process waypoints from the smooth surface that they were planned on,
     at the stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on
     the surface that are worked, along the lines and between waypoints too, from the object as it
-    was given (`nrdf.surface.given_surface`), which judged_by names; less than resolution_m it
+    was given (`nrdf.surface.given_surface`), which compared_with names; less than resolution_m it
     cannot tell. None where it is not known.
 
     axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
@@ -111,46 +116,47 @@ class Measures:
     path_length_m: float
     process_length_m: float
     cycle_time_s: float
-    judged_by: str | None = None
+    compared_with: str | None = None
     resolution_m: float | None = None
     true_distance_worst_m: float | None = None
     true_distance_99_m: float | None = None
     true_distance_95_m: float | None = None
 
 
-def measure(
+def measure_path(
     surface: Surface,
     region: np.ndarray,
     strategy: Strategy,
     segments: Sequence[Segment],
     given: GivenSurface | None = None,
-) -> Measures:
-    """Figures of `segments` on `region`, indices (k,) of the surface's points.
+) -> ToolPathMetrics:
+    """Metrics of `segments` on `region`, indices (k,) of the surface's points.
 
     The region's points, each of which stands for the same area, tell what is covered. given: the
-    object itself, to be judged by. Raises ProcessError if there is no process segment.
+    object itself, which the path is compared with. Raises ProcessError where there is no process
+    segment.
     """
     work = [segment for segment in segments if segment.kind == "process"]
     if not work:
         raise ProcessError("a tool path without a process segment cannot be measured")
-    wanted = Wanted.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
+    region_points = RegionPoints.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
     axes = [segment.axes for segment in work]
     contacts = [
         s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
     ]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
-    track = Track.along(
+    sampled = SampledPath.along(
         contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
     )
-    points, normals = surface.points[wanted.points], surface.normals[wanted.points]
-    visits = track.visits(points, normals, strategy.tool_radius_m)
-    worked = visits[(visits > 0) & wanted.free]
-    spacing = line_spacing(wanted.patches, track, strategy.stepover_m).distance
+    points, normals = surface.points[region_points.points], surface.normals[region_points.points]
+    counts = sampled.coverage_count(points, normals, strategy.tool_radius_m)
+    worked = counts[(counts > 0) & region_points.accessible]
+    spacing = line_spacing(region_points.patches, sampled, strategy.stepover_m).distance
     off, wrong = _fit(surface, strategy, work, contacts)
     step, turn, bend = _jumps(work, contacts, axes)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
-    shares = wanted.coverage(visits > 0)
-    made = Measures(
+    shares = region_points.coverage(counts > 0)
+    made = ToolPathMetrics(
         coverage=shares.worked,
         left_out=shares.left_out,
         unreached=shares.unreached,
@@ -169,11 +175,11 @@ def measure(
     )
     if given is None:
         return made
-    fine = Track.along(contacts[:once], axes[:once], _JUDGED_M, 0.0)
+    fine = SampledPath.along(contacts[:once], axes[:once], _COMPARED_M, 0.0)
     away = given.distance(fine.places, fine.axes)
     return replace(
         made,
-        judged_by=given.name,
+        compared_with=given.name,
         resolution_m=given.resolution_m,
         true_distance_worst_m=float(away.max()),
         true_distance_99_m=float(np.quantile(away, 0.99)),
@@ -209,18 +215,20 @@ def _fit(
     the angle (n,), rad, between tool z and what the strategy asks for on smooth normals."""
     everywhere = np.concatenate(contacts)
     held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
-    lean = lean_rotation(strategy.lead_rad, strategy.tilt_rad)
-    tails = -(held * lean.inv()).as_matrix()[:, :, 2]
+    tilt = tilt_rotation(strategy.lead_rad, strategy.tilt_rad)
+    tails = -(held * tilt.inv()).as_matrix()[:, :, 2]
     _, _, off = surface.nearest(everywhere, tails)
     off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
     smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
     asked = []
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
     for line, normals in zip(contacts, np.split(smooth, cuts), strict=True):
-        # A waypoint alone has no travel; for a tool that does not lean, any will do.
-        travel = travel_of(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
+        # A waypoint alone has no travel; for a tool that is not tilted, any will do.
+        travel = (
+            travel_directions(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
+        )
         asked.append(surface_frames(travel, normals))
-    axes = (Rotation.from_matrix(np.concatenate(asked)) * lean).as_matrix()[:, :, 2]
+    axes = (Rotation.from_matrix(np.concatenate(asked)) * tilt).as_matrix()[:, :, 2]
     cosine = np.einsum("na,na->n", axes, held.as_matrix()[:, :, 2])
     return off, np.arccos(np.clip(cosine, -1.0, 1.0))
 

@@ -1,4 +1,4 @@
-"""From a taught strategy and a region of a surface to the segments that a robot drives."""
+"""The planner: from a strategy and a region of a surface to the segments that a robot drives."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import without_sign_jumps
-from nrdf.surface.accessibility import with_room
+from nrdf.surface.accessibility import accessible_points
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.contour import contour, spiral
-from nrdf.toolpath.effort import check_effort, check_passes
-from nrdf.toolpath.frames import lean_rotation, surface_frames, travel_of
-from nrdf.toolpath.gap_filling import fill_gaps, touch_up
-from nrdf.toolpath.raster import Stroke, raster
-from nrdf.toolpath.sampled_path import line_spacing, track_of
+from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
+from nrdf.toolpath.gap_filling import fill_missed_points, fill_wide_gaps
+from nrdf.toolpath.plan_size import check_passes, check_size
+from nrdf.toolpath.raster import raster
+from nrdf.toolpath.sampled_path import line_spacing, sample_lines
 from nrdf.toolpath.strategy import Strategy
-from nrdf.toolpath.surface_path import Line, nearest_first, on_surface
+from nrdf.toolpath.surface_path import (
+    PlanarPath,
+    SurfacePath,
+    order_nearest_first,
+    place_on_surface,
+)
 from nrdf.toolpath.types import Segment
 
 LEAST_IN_SURFACE = 0.2
@@ -34,23 +39,25 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     The region is cut into patches that lie flat without folds (`nrdf.surface.patch`), and each into
     lines; what those leave out nearby has short lines of its own. Every line has its approach,
     process and retract segments; an approach or retract distance of 0 leaves its segments out.
-    Places without room for the tool (`nrdf.surface.accessibility`) are left out like holes. Raises
-    ProcessError for a margin or clearance that leaves nothing of the region, a stepover wider than
-    it, a direction that stands on it, or more than `nrdf.toolpath.effort` allows.
+    Points that the tool cannot access (`nrdf.surface.accessibility`) are left out like holes.
+    Raises ProcessError for a margin or clearance that leaves nothing of the region, a stepover
+    wider than it, a direction that stands on it, or more than `nrdf.toolpath.plan_size` allows.
     """
-    region = with_room(surface, region, strategy.clearance_m)
+    region = accessible_points(surface, region, strategy.clearance_m)
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
-    check_effort(patches, strategy)
-    lines: list[Line] = []
+    check_size(patches, strategy)
+    lines: list[SurfacePath] = []
     for sweep in _sweeps(patches, strategy):
         found = [
-            block for patch, strokes in sweep for block in _even(surface, patch, strokes, strategy)
+            block
+            for patch, paths in sweep
+            for block in _evenly_spaced(surface, patch, paths, strategy)
         ]
-        drawn = [line for block in nearest_first(found) for line in block]
+        drawn = [line for block in order_nearest_first(found) for line in block]
         lines += drawn
         reach, apart = strategy.tool_radius_m, strategy.stepover_m
-        lines += fill_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
+        lines += fill_wide_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
     if not lines:
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
@@ -58,7 +65,7 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
             f"innermost place is {deepest:.3g} m from its border; give less than that"
         )
     wanted = inside_margin(surface, region, patches, strategy.edge_margin_m)
-    lines += touch_up(
+    lines += fill_missed_points(
         surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
     )
     contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
@@ -99,9 +106,11 @@ def _tool_segments(
     contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
 ) -> list[Segment]:
     """Process segments of a tool along lines on the surface."""
-    travel = np.concatenate([travel_of(line, 0.5 * strategy.stepover_m) for line in contacts])
+    travel = np.concatenate(
+        [travel_directions(line, 0.5 * strategy.stepover_m) for line in contacts]
+    )
     upright = surface_frames(travel, np.concatenate(normals))
-    turned = Rotation.from_matrix(upright) * lean_rotation(strategy.lead_rad, strategy.tilt_rad)
+    turned = Rotation.from_matrix(upright) * tilt_rotation(strategy.lead_rad, strategy.tilt_rad)
     places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
     quaternions = [without_sign_jumps(part) for part in np.split(turned.as_quat(), cuts)]
@@ -124,8 +133,8 @@ def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
 
 def _sweeps(
     patches: Sequence[Patch], strategy: Strategy
-) -> list[list[tuple[Patch, Callable[[float], list[list[Stroke]]]]]]:
-    """For each sweep over the region, every patch with its strokes, by parts, at a stepover."""
+) -> list[list[tuple[Patch, Callable[[float], list[list[PlanarPath]]]]]]:
+    """For each sweep over the region, every patch with its paths, by parts, at a stepover."""
     margin = strategy.edge_margin_m
     if strategy.trajectory in ("contour", "spiral"):
         way = contour if strategy.trajectory == "contour" else spiral
@@ -141,12 +150,12 @@ def _sweeps(
     ]
 
 
-def _even(
+def _evenly_spaced(
     surface: Surface,
     patch: Patch,
-    strokes: Callable[[float], list[list[Stroke]]],
+    paths: Callable[[float], list[list[PlanarPath]]],
     strategy: Strategy,
-) -> list[list[Line]]:
+) -> list[list[SurfacePath]]:
     """Blocks of lines on a patch, nowhere much farther apart than a stepover.
 
     On few points, or round an edge, the patch's plane tells distances along the surface less well
@@ -156,14 +165,14 @@ def _even(
     wanted = stepover = strategy.stepover_m
     best, least = [], np.inf
     for _ in range(_TRIES):
-        blocks = on_surface(
-            surface, patch, strokes(stepover), strategy.spacing_m, strategy.tool_radius_m
+        blocks = place_on_surface(
+            surface, patch, paths(stepover), strategy.spacing_m, strategy.tool_radius_m
         )
         lines = [line for block in blocks for line in block]
         if not lines:
             break
-        track = track_of(lines, strategy.tool_radius_m, wanted)
-        apart = line_spacing([patch], track, wanted).distance
+        sampled = sample_lines(lines, strategy.tool_radius_m, wanted)
+        apart = line_spacing([patch], sampled, wanted).distance
         wide = float((apart > _WIDE * wanted).mean()) if len(apart) else 0.0
         if wide < least:
             best, least = blocks, wide
@@ -209,18 +218,18 @@ def _segments(
         Rotation.from_quat(quaternions[[0, -1]]).as_matrix()[:, :, 0], normals[[0, -1]]
     )
     if strategy.approach_distance_m > 0.0:
-        away = _leaving(ends[0], -strategy.approach_angle_rad)
+        away = _direction_away(ends[0], -strategy.approach_angle_rad)
         start = positions[0] + strategy.approach_distance_m * away
         way, held = np.stack([start, positions[0]]), quaternions[[0, 0]]
         segments.insert(0, Segment("approach", number, way, held, strategy.approach_feed_m_s))
     if strategy.retract_distance_m > 0.0:
-        away = _leaving(ends[1], strategy.retract_angle_rad)
+        away = _direction_away(ends[1], strategy.retract_angle_rad)
         stop = positions[-1] + strategy.retract_distance_m * away
         way, held = np.stack([positions[-1], stop]), quaternions[[-1, -1]]
         segments.append(Segment("retract", number, way, held, strategy.retract_feed_m_s))
     return segments
 
 
-def _leaving(frame: np.ndarray, angle: float) -> np.ndarray:
+def _direction_away(frame: np.ndarray, angle: float) -> np.ndarray:
     """The direction at `angle` (rad) from the normal towards x of an upright frame (3, 3)."""
     return np.sin(angle) * frame[:, 0] - np.cos(angle) * frame[:, 2]

@@ -10,12 +10,12 @@ from scipy import ndimage
 from nrdf.geometry.polylines import total_length
 from nrdf.surface.grid import Grid
 from nrdf.surface.patch import Patch
-
-Stroke = np.ndarray
-"""(m, 2): places in a patch's plane that a tool passes without lifting."""
+from nrdf.toolpath.surface_path import PlanarPath
 
 
-def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> list[list[Stroke]]:
+def raster(
+    patch: Patch, angle: float, stepover_m: float, margin_m: float
+) -> list[list[PlanarPath]]:
     """Lines across a patch, at `angle` (rad) in its plane, even along the surface.
 
     One list for each connected part of the patch inside its margin, in snake order; lines are
@@ -40,14 +40,14 @@ def raster(patch: Patch, angle: float, stepover_m: float, margin_m: float) -> li
     parts, count = ndimage.label(free, np.ones((3, 3)))
     blocks = [_part(grid, across, parts == k, clearance, stepover_m) for k in range(1, count + 1)]
     # Shorter than what the border is known to, a line is worth no approach of its own.
-    return [[stroke @ turn for stroke in _long(block, patch.spacing)] for block in blocks if block]
+    return [[path @ turn for path in _long(block, patch.spacing)] for block in blocks if block]
 
 
-def _long(strokes: list[Stroke], least: float) -> list[Stroke]:
+def _long(paths: list[PlanarPath], least: float) -> list[PlanarPath]:
     """Strokes no shorter than `least`; the longest, if there are none."""
-    length = [total_length(s) for s in strokes]
+    length = [total_length(s) for s in paths]
     least = min(least, max(length))
-    return [stroke for stroke, way in zip(strokes, length, strict=True) if way >= least]
+    return [path for path, way in zip(paths, length, strict=True) if way >= least]
 
 
 def strip_middles(width: float, stepover: float) -> np.ndarray:
@@ -87,7 +87,7 @@ def _part(
     inside: np.ndarray,
     clearance: Callable[[np.ndarray], np.ndarray],
     stepover: float,
-) -> list[Stroke]:
+) -> list[PlanarPath]:
     """Strokes of the part of a grid that is `inside`; across: distance square to the lines."""
     low, high = across[inside].min(), across[inside].max()
     levels = low + strip_middles(high - low, stepover)
@@ -99,11 +99,11 @@ def _part(
     lines = np.stack([np.broadcast_to(u, v.shape), v], axis=-1)
     near_line = grid.sample(near.astype(float), lines) > 0.0
     free = np.where(near_line, clearance(lines), -grid.pitch)
-    strokes: list[Stroke] = []
+    paths: list[PlanarPath] = []
     for number in range(len(levels)):
         row = _stretches(lines[number], free[number])
-        strokes += row if number % 2 == 0 else [stretch[::-1] for stretch in row[::-1]]
-    return strokes
+        paths += row if number % 2 == 0 else [stretch[::-1] for stretch in row[::-1]]
+    return paths
 
 
 def _stretches(line: np.ndarray, free: np.ndarray) -> list[np.ndarray]:

@@ -1,4 +1,4 @@
-"""The way of a tool over a surface: what its footprint reaches, and how far its lines are apart."""
+"""A tool path sampled densely: what its footprint covers, and how far its lines are apart."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch
-from nrdf.toolpath.frames import travel_of
-from nrdf.toolpath.surface_path import Line
+from nrdf.toolpath.frames import travel_directions
+from nrdf.toolpath.surface_path import SurfacePath
 
 _FACING = 0.2
 """Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
@@ -24,20 +24,25 @@ _NEXT_TO = 8  # points of which one is next to a place, on its side
 
 
 @dataclass(frozen=True)
-class Track:
-    """A tool's way, sampled densely: places (n, 3), tool z (n, 3), travel (n, 3), averaged over
-    a way to either side; walked (n,), m, from the start, with a long step from line to line."""
+class SampledPath:
+    """A tool path sampled densely.
+
+    places: (n, 3) contacts; axes: (n, 3) tool z; travel: (n, 3), averaged over a distance to either
+    side; arc_length: (n,), m, from the start, with a long step from line to line; step: m, between
+    samples.
+    """
 
     places: np.ndarray
     axes: np.ndarray
     travel: np.ndarray
-    walked: np.ndarray
+    arc_length: np.ndarray
     step: float
 
     @staticmethod
     def along(
         contacts: list[np.ndarray], axes: list[np.ndarray], step: float, smooth: float
-    ) -> Track:
+    ) -> SampledPath:
+        """Samples of lines, `step` apart: contacts and axes (n, 3) of each line."""
         places, turned, travel, walked = [], [], [], []
         far = 0.0
         for line, axis in zip(contacts, axes, strict=True):
@@ -46,25 +51,25 @@ class Track:
             fine = interpolate(at, way, line)
             places.append(fine)
             turned.append(interpolate(at, way, axis))
-            travel.append(travel_of(fine, smooth) if len(line) > 1 else np.zeros_like(fine))
+            travel.append(travel_directions(fine, smooth) if len(line) > 1 else np.zeros_like(fine))
             walked.append(far + at)
             far += way[-1] + 1e3
         place, axis, ahead, way = map(np.concatenate, (places, turned, travel, walked))
-        return Track(place, unit_vectors(axis), ahead, way, step)
+        return SampledPath(place, unit_vectors(axis), ahead, way, step)
 
-    def visits(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
+    def coverage_count(self, points: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
         """How often (m,) the footprint passes over points (m, 3) with normals (m, 3)."""
         if not len(points):
             return np.zeros(0, int)
         point, place = _reached(points, normals, self.places, self.axes, radius)
         order = np.lexsort((place, point))
-        point, way = point[order], self.walked[place[order]]
+        point, way = point[order], self.arc_length[place[order]]
         new = np.ones(len(point), bool)
         new[1:] = (point[1:] != point[:-1]) | (np.diff(way) > 2.5 * self.step)
         return np.bincount(point[new], minlength=len(points))
 
 
-def covered(
+def reached_points(
     points: np.ndarray,
     normals: np.ndarray,
     places: np.ndarray,
@@ -92,16 +97,16 @@ def _reached(
     return point[facing], place[facing]
 
 
-def track_of(lines: Sequence[Line], radius_m: float, stepover_m: float) -> Track:
-    """The way of an upright tool of that radius along lines."""
+def sample_lines(lines: Sequence[SurfacePath], radius_m: float, stepover_m: float) -> SampledPath:
+    """An upright tool of that radius along lines, sampled."""
     contacts, tools = [line.contacts for line in lines], [-line.normals for line in lines]
-    return Track.along(contacts, tools, radius_m / 4.0, 0.5 * stepover_m)
+    return SampledPath.along(contacts, tools, radius_m / 4.0, 0.5 * stepover_m)
 
 
 @dataclass(frozen=True)
-class Neighbours:
-    """Places of a track, by index (k,), places (k, 3) on the next lines beside them, and distances
-    (k,), m, along the surface. patch: number (k,) of the patch that they were found in; middle:
+class LineNeighbours:
+    """Samples, by index (k,), places (k, 3) on the next lines beside them, and distances (k,), m,
+    along the surface. patch: number (k,) of the patch that they were found in; middle:
     (k, 2), half-way between the two in its plane."""
 
     place: np.ndarray
@@ -111,17 +116,19 @@ class Neighbours:
     middle: np.ndarray
 
     @staticmethod
-    def none() -> Neighbours:
+    def none() -> LineNeighbours:
         nobody = np.zeros(0, int)
-        return Neighbours(nobody, np.zeros((0, 3)), np.zeros(0), nobody, np.zeros((0, 2)))
+        return LineNeighbours(nobody, np.zeros((0, 3)), np.zeros(0), nobody, np.zeros((0, 2)))
 
     @staticmethod
-    def joined(parts: Sequence[Neighbours]) -> Neighbours:
-        names = [field.name for field in fields(Neighbours)]
-        return Neighbours(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
+    def joined(parts: Sequence[LineNeighbours]) -> LineNeighbours:
+        names = [field.name for field in fields(LineNeighbours)]
+        return LineNeighbours(
+            *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
+        )
 
 
-def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Neighbours:
+def line_spacing(patches: Sequence[Patch], sampled: SampledPath, stepover: float) -> LineNeighbours:
     """How far apart neighbouring lines are, along the surface.
 
     Square to the travel: the next line to either side counts if the region goes on all the way to
@@ -131,48 +138,48 @@ def line_spacing(patches: Sequence[Patch], track: Track, stepover: float) -> Nei
     there counts: the width of the largest disc between lines. Neighbours are found in the patches'
     planes, and measured in space.
     """
-    tails = -track.axes
+    tails = -sampled.axes
     nearest: np.ndarray = np.full(len(tails), np.inf)
     owner: np.ndarray = np.zeros(len(tails), int)
     for number, patch in enumerate(patches):
-        away = _placed(patch, track.places, tails, patch.label == OWN)[0]
+        away = _placed(patch, sampled.places, tails, patch.label == OWN)[0]
         owner = np.where(away < nearest, number, owner)
         nearest = np.minimum(away, nearest)
-    found = [Neighbours.none()]
+    found = [LineNeighbours.none()]
     for number, patch in enumerate(patches):
         # Lines beyond a seam between patches are neighbours as well.
-        _, point, uv = _placed(patch, track.places, tails, np.ones(len(patch.label), bool))
-        off = np.linalg.norm(track.places - patch.points[point], axis=1)
+        _, point, uv = _placed(patch, sampled.places, tails, np.ones(len(patch.label), bool))
+        off = np.linalg.norm(sampled.places - patch.points[point], axis=1)
         facing = np.einsum("na,na->n", patch.normals[point], tails)
         # A line over a few points on a face of their own is beside none.
         mine = np.flatnonzero(((owner == number) | (off < patch.spacing)) & (facing > _FACING))
         if len(mine):
-            travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], track.travel[mine])
+            travel = np.einsum("nba,na->nb", patch.tangents[point[mine]], sampled.travel[mine])
             asking = owner[mine] == number
-            near = _beside(patch, number, track, mine, uv[mine], travel, asking, stepover)
+            near = _beside(patch, number, sampled, mine, uv[mine], travel, asking, stepover)
             found.append(near)
-    return Neighbours.joined(found)
+    return LineNeighbours.joined(found)
 
 
 def _beside(
     patch: Patch,
     number: int,
-    track: Track,
+    sampled: SampledPath,
     mine: np.ndarray,
     place: np.ndarray,
     travel: np.ndarray,
     asking: np.ndarray,
     stepover: float,
-) -> Neighbours:
+) -> LineNeighbours:
     """`line_spacing` in one patch, from those of its places that are `asking` (n,).
 
-    number: the patch's. mine: (n,) of the track's places; place, travel: (n, 2), in its plane.
+    number: the patch's. mine: (n,) of the samples; place, travel: (n, 2), in its plane.
     """
-    reach, walked = 2.5 * stepover, track.walked[mine]
+    reach, walked = 2.5 * stepover, sampled.arc_length[mine]
     tree = cKDTree(place)
-    pairs = tree.sparse_distance_matrix(tree, reach + track.step, output_type="ndarray")
+    pairs = tree.sparse_distance_matrix(tree, reach + sampled.step, output_type="ndarray")
     i, j = pairs["i"], pairs["j"]
-    going_on = np.append((np.diff(walked) < 2.0 * track.step) & (np.diff(mine) == 1), False)
+    going_on = np.append((np.diff(walked) < 2.0 * sampled.step) & (np.diff(mine) == 1), False)
     kept = going_on[j] & asking[i]
     i, j = i[kept], j[kept]
     # Where each step j of a line, to the place after it, crosses the square on the travel at i.
@@ -183,7 +190,7 @@ def _beside(
     side = travel[i, 0] * crossing[:, 1] - travel[i, 1] * crossing[:, 0]
     away = np.linalg.norm(crossing, axis=1)
     kept = (before * after <= 0.0) & (before != after) & (away < reach)
-    kept &= np.abs(walked[i] - walked[j]) > np.clip(3.0 * away, 2.0 * track.step, reach)
+    kept &= np.abs(walked[i] - walked[j]) > np.clip(3.0 * away, 2.0 * sampled.step, reach)
     i, j, share, crossing, away = (v[kept] for v in (i, j, share, crossing, away))
     key = 2 * i + (side[kept] > 0.0)
     order = np.lexsort((away, key))
@@ -195,16 +202,16 @@ def _beside(
     for part in np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]:
         whole &= patch.border.distance(place[i] + part * crossing) > _SURE * patch.spacing
     i, j, share, crossing = i[whole], j[whole], share[whole, None], crossing[whole]
-    line = track.places[mine[j]]
-    beside = line + share * (track.places[mine[j + 1]] - line)
-    chord = np.linalg.norm(beside - track.places[mine[i]], axis=1)
-    turned = np.einsum("pa,pa->p", track.axes[mine[i]], track.axes[mine[j]])
+    line = sampled.places[mine[j]]
+    beside = line + share * (sampled.places[mine[j + 1]] - line)
+    chord = np.linalg.norm(beside - sampled.places[mine[i]], axis=1)
+    turned = np.einsum("pa,pa->p", sampled.axes[mine[i]], sampled.axes[mine[j]])
     half = 0.5 * np.arccos(np.clip(turned, 0.0, 1.0))
     middle = place[i] + 0.5 * crossing
     nearest = tree.query(middle)[0] / np.maximum(np.linalg.norm(crossing, axis=1), 1e-12)
     arc = chord / np.sinc(half / np.pi)
     distance = arc * np.minimum(1.0, 2.0 * nearest)
-    return Neighbours(mine[i], beside, distance, np.full(len(i), number), middle)
+    return LineNeighbours(mine[i], beside, distance, np.full(len(i), number), middle)
 
 
 def _placed(

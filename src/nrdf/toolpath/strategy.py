@@ -23,7 +23,7 @@ class Strategy:
     the surface; spacing_m: between waypoints, about; edge_margin_m: waypoints keep that far inside
     the region's border, and the footprint may reach over; tool_radius_m: of the footprint.
     clearance_m: that much must be free before the surface, along its normal, where it is worked.
-    lead_rad: leans the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
+    lead_rad: tilts the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
     the normal. standoff_m: from the tool centre point to the surface along the tool's axis.
     passes: the lines are driven that often, back and forth. Approach and retract: length of the
     free moves before and after a line, their angle from the normal (0: along the normal; pi/2:

@@ -1,4 +1,4 @@
-"""Strokes in a patch's plane brought onto the surface: lines of a tool's contacts."""
+"""Paths before they are segments: in a patch's plane, and as a tool's contacts with the surface."""
 
 from __future__ import annotations
 
@@ -11,45 +11,49 @@ from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.polylines import even_arc_lengths, interpolate, step_lengths, summed
 from nrdf.surface.patch import Patch
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.raster import Stroke
 
 _TOUCHES, _RESTS = 4, 2e-4  # rounds, and the distance (m) at which a contact counts as found
-_JUMP = 1.5  # a way that much longer in space than in a patch's plane leads to another sheet
+_JUMP = 1.5  # a step that much longer in space than in a patch's plane leads to another sheet
+
+
+PlanarPath = np.ndarray
+"""(m, 2): points in a patch's plane that a tool passes without lifting."""
 
 
 @dataclass(frozen=True)
-class Line:
-    """A stroke on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
+class SurfacePath:
+    """A path on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
 
     contacts: np.ndarray
     normals: np.ndarray
 
-    def reversed(self) -> Line:
-        return Line(self.contacts[::-1], self.normals[::-1])
+    def reversed(self) -> SurfacePath:
+        """The same path from its end to its start."""
+        return SurfacePath(self.contacts[::-1], self.normals[::-1])
 
 
-def on_surface(
+def place_on_surface(
     surface: Surface,
     patch: Patch,
-    parts: Sequence[Sequence[Stroke]],
+    parts: Sequence[Sequence[PlanarPath]],
     spacing_m: float,
     radius_m: float,
-) -> list[list[Line]]:
-    """Strokes brought onto the surface, their waypoints evenly spaced: a block of lines a part."""
-    strokes = [stroke for part in parts for stroke in part]
-    if not strokes:
+) -> list[list[SurfacePath]]:
+    """Planar paths placed on the surface, their contacts evenly spaced: a block of paths a part."""
+    paths = [path for part in parts for path in part]
+    if not paths:
         return []
-    cuts = np.cumsum([len(stroke) for stroke in strokes])[:-1]
+    cuts = np.cumsum([len(path) for path in paths])[:-1]
     even = []
-    flat = patch.at(np.concatenate(strokes))[0]
-    for stroke, way in zip(strokes, np.split(flat, cuts), strict=True):
-        along = summed(np.minimum(step_lengths(way), _JUMP * step_lengths(stroke)))
+    flat = patch.at(np.concatenate(paths))[0]
+    for path, way in zip(paths, np.split(flat, cuts), strict=True):
+        along = summed(np.minimum(step_lengths(way), _JUMP * step_lengths(path)))
         at = even_arc_lengths(float(along[-1]), spacing_m, nearest=True)
-        even.append(interpolate(at, along, stroke))
+        even.append(interpolate(at, along, path))
     places = np.concatenate(even)
     flat, along = patch.at(places)
     outward = unit_vectors(np.cross(along[:, 0], along[:, 1]))
-    contacts, normals, there = touching(surface, flat, outward, patch.spacing, radius_m)
+    contacts, normals, there = find_contacts(surface, flat, outward, patch.spacing, radius_m)
     farthest = 2.0 * spacing_m + 0.5 * patch.spacing
     blocks, first = [], 0
     ends = iter(np.cumsum([len(line) for line in even]))
@@ -61,14 +65,14 @@ def on_surface(
             # A waypoint that is missing alone is no gap; a step too far is.
             step = step_lengths(contacts[found])
             runs = np.split(found, np.flatnonzero(step > farthest) + 1)
-            block += [Line(contacts[run], normals[run]) for run in runs if len(run) > 1]
+            block += [SurfacePath(contacts[run], normals[run]) for run in runs if len(run) > 1]
             first = last
         if block:
             blocks.append(block)
     return blocks
 
 
-def touching(
+def find_contacts(
     surface: Surface, flat: np.ndarray, outward: np.ndarray, near: float, radius_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The contact (n, 3) of a tool with the surface at places (n, 3), at most `near` (m) from them.
@@ -94,7 +98,7 @@ def touching(
     return contacts, normals, there
 
 
-def nearest_first(blocks: list[list[Line]]) -> list[list[Line]]:
+def order_nearest_first(blocks: list[list[SurfacePath]]) -> list[list[SurfacePath]]:
     """Blocks of lines ordered, and driven forwards or backwards, so that ways between are short."""
     waiting, ordered = list(blocks), []
     place: np.ndarray | None = None

@@ -72,9 +72,9 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
         results.transfer(document, lambda done, total: shares.append(done / total))
     (region,) = document.regions
     one, other = here.plan(region, 0), there.plan(region, 0)
-    assert other.checked.measures == one.checked.measures and not other.fault
+    assert other.checked.metrics == one.checked.metrics and not other.fault
     one, other = (results.by_target["new"].transfer_result for results in (here, there))
-    assert [p.measures for p in other.paths] == [p.measures for p in one.paths]
+    assert [p.metrics for p in other.paths] == [p.metrics for p in one.paths]
     assert there.is_current("new") and max(shares) > 0.0
     one, other = (results.described(document, silent).distances(17) for results in (here, there))
     np.testing.assert_allclose(other["new"], one["new"], atol=1e-6)

@@ -49,7 +49,7 @@ def test_plans_hold_as_long_as_what_they_are_of(results):
     results.make_plans(editor.document, silent)
     top, front = editor.document.regions
     plan = results.plan(top, 0)
-    assert not plan.fault and plan.checked.measures.coverage > 0.9 and plan.lines
+    assert not plan.fault and plan.checked.metrics.coverage > 0.9 and plan.lines
     editor.change_numbers("top", 0, {"stepover_mm": 20.0})
     editor.recolour_region("front", (1, 2, 3))
     top, front = editor.document.regions

@@ -18,8 +18,8 @@ from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.planning.tracks import Reachability
 from nrdf.robot.simulation.execute import Log
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import Coverage, Wanted
-from nrdf.toolpath.sampled_path import covered as reached_by
+from nrdf.toolpath.metrics import Coverage, RegionPoints
+from nrdf.toolpath.sampled_path import reached_points
 from nrdf.toolpath.types import ToolPath
 
 Verdict = Literal["reached", "limit", "singular", "collision", "too fast"]
@@ -95,14 +95,14 @@ def measure_path(
     verdicts = _verdicts(lines, program, covered, why)
     away, angle = _errors(cell, lines, program)
     leans = _leans(lines, program)
-    wanted = Wanted.of(
+    wanted = RegionPoints.of(
         surface, lesson.regions[path.region], process.tool.clearance_m, process.edge_margin_m
     )
     points, normals = surface.points[wanted.points], surface.normals[wanted.points]
     height = process.standoff_m
 
     def reached(places: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        return reached_by(points, normals, places, axes, path.tool_radius_m)
+        return reached_points(points, normals, places, axes, path.tool_radius_m)
 
     planned = reached(*_swept([(line.positions, line.axes) for line in lines], height))
     parts = [(lines[s.line].positions[s.first : s.last + 1], s.axes) for s in program.strokes]
@@ -133,8 +133,8 @@ def measure_path(
         driven=wanted.coverage(driven),
         achieved=wanted.coverage(worked),
         region_points=surface.kept[wanted.points],
-        worked=worked & wanted.free,
-        wanted=wanted.free & wanted.inside,
+        worked=worked & wanted.accessible,
+        wanted=wanted.accessible & wanted.inside_margin,
         force_asked_n=asked,
         force_mean_n=float(force.mean()) if len(force) else None,
         force_spread_n=float(force.std()) if len(force) else None,

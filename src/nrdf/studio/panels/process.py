@@ -118,13 +118,13 @@ class ProcessTab:
         plan = studio.results.plan(region, studio.step)
         if plan is None:
             return "*planning …*"
-        if plan.fault or plan.checked is None or plan.checked.measures is None:
+        if plan.fault or plan.checked is None or plan.checked.metrics is None:
             return f"⚠ {_labelled(plan.fault)}"
-        measures = plan.checked.measures
-        worked, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(measures))
-        minutes, seconds = divmod(round(measures.cycle_time_s), 60)
+        metrics = plan.checked.metrics
+        worked, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(metrics))
+        minutes, seconds = divmod(round(metrics.cycle_time_s), 60)
         lines = [
-            f"**{measures.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
+            f"**{metrics.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
             f"of the region **{worked} %** worked, {left_out} % left out, {missed} % missed",
             f"lines at most {widest} mm apart, {off} mm off the object; steps of at most {step} "
             f"mm, turns of at most {turn}°",

@@ -74,7 +74,7 @@ class TargetsTab:
             region = report["regions"][path["region"]]
             confidence = region["confidence"]
             doubted = not region["found"] or confidence < LOW_CONFIDENCE
-            covered = shares_in_words(path["measures"]) if path["planned"] else "–"
+            covered = shares_in_words(path["metrics"]) if path["planned"] else "–"
             flag = "⚠ " if doubted else ""
             rows.append(
                 f"| {flag}{path['region']} | {path['process']} | {confidence:.2f} | {covered} |"

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.frames import unit_vectors, without_sign_jumps
-from nrdf.toolpath.frames import lean_rotation, surface_frames, tool_quaternions, travel_of
+from nrdf.toolpath.frames import surface_frames, tilt_rotation, tool_quaternions, travel_directions
 
 FORWARD, UP, RIGHT = np.eye(3)[0], np.eye(3)[2], -np.eye(3)[1]
 
@@ -38,7 +38,7 @@ def test_lead_leans_the_tail_towards_the_travel_and_tilt_to_its_right(angle):
 
 
 def test_lead_and_tilt_are_turns_about_the_tools_own_axes():
-    turn = lean_rotation(0.3, 0.2)
+    turn = tilt_rotation(0.3, 0.2)
     np.testing.assert_allclose(
         turn.as_matrix(),
         (Rotation.from_rotvec([0, -0.3, 0]) * Rotation.from_rotvec([0.2, 0, 0])).as_matrix(),
@@ -59,9 +59,9 @@ def test_quaternions_do_not_change_sign_along_a_circle():
 def test_travel_is_central_and_smoothed_over_corners():
     corner = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0.0]])
     np.testing.assert_allclose(
-        travel_of(corner)[[0, 2, 4]], [FORWARD, unit_vectors([1, 1, 0]), -RIGHT]
+        travel_directions(corner)[[0, 2, 4]], [FORWARD, unit_vectors([1, 1, 0]), -RIGHT]
     )
-    np.testing.assert_allclose(travel_of(corner, 1.0)[1], unit_vectors(np.array([2, 1, 0])))
+    np.testing.assert_allclose(travel_directions(corner, 1.0)[1], unit_vectors(np.array([2, 1, 0])))
 
 
 def test_the_travel_of_a_closed_line_goes_on_over_its_ends():
@@ -69,4 +69,4 @@ def test_the_travel_of_a_closed_line_goes_on_over_its_ends():
     circle = np.c_[np.cos(angle), np.sin(angle), np.zeros(41)]
     wanted = np.c_[-np.sin(angle), np.cos(angle), np.zeros(41)]
     for smooth in (0.0, 0.3):
-        np.testing.assert_allclose(travel_of(circle, smooth), wanted, atol=1e-9)
+        np.testing.assert_allclose(travel_directions(circle, smooth), wanted, atol=1e-9)

@@ -7,9 +7,9 @@ import pytest
 
 from builders.solids import box
 from nrdf.errors import ProcessError
-from nrdf.surface.accessibility import with_room
+from nrdf.surface.accessibility import accessible_points
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import measure
+from nrdf.toolpath.metrics import measure_path
 from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import Strategy
 
@@ -26,7 +26,7 @@ def stacked(gap):
 @pytest.mark.parametrize("gap", [0.0, 0.01, 0.025])
 def test_what_lies_under_another_part_has_no_room(gap):
     surface, top = stacked(gap)
-    free = with_room(surface, top, 0.03)
+    free = accessible_points(surface, top, 0.03)
     x, _, z = np.abs(surface.points[top]).T
     expected = top[surface.points[top, 0] < 0.0]
     at_the_rim = top[(x < 0.01) | (x > 0.19) | (z > 0.19)]
@@ -42,17 +42,17 @@ def test_a_thin_part_is_not_stepped_over():
     top = (np.arange(len(x)) < len(low)) & (surface.normals[:, 1] > 0.5)
     under = np.flatnonzero(top & (x > 0.02) & (x < 0.18) & (np.abs(z) < 0.18))
     beside = np.flatnonzero(top & (x < -0.02))
-    free = with_room(surface, np.concatenate([under, beside]), 0.012)
+    free = accessible_points(surface, np.concatenate([under, beside]), 0.012)
     assert np.isin(under, free).mean() < 0.15
     assert np.isin(beside, free).all()
 
 
 def test_walls_beside_and_gaps_that_are_wide_enough_do_not_matter():
     surface, top = stacked(0.05)
-    np.testing.assert_array_equal(with_room(surface, top, 0.03), top)
-    np.testing.assert_array_equal(with_room(surface, top, 0.0), top)
+    np.testing.assert_array_equal(accessible_points(surface, top, 0.03), top)
+    np.testing.assert_array_equal(accessible_points(surface, top, 0.0), top)
     side = np.flatnonzero(surface.normals[:, 0] < -0.5)
-    np.testing.assert_array_equal(with_room(surface, side, 1e9), side)
+    np.testing.assert_array_equal(accessible_points(surface, side, 1e9), side)
 
 
 def test_a_plan_keeps_out_and_its_figures_say_how_much():
@@ -61,11 +61,11 @@ def test_a_plan_keeps_out_and_its_figures_say_how_much():
     segments = plan(surface, top, strategy)
     work = np.concatenate([s.positions for s in segments if s.kind == "process"])
     assert work[:, 0].max() < 0.01
-    figures = measure(surface, top, strategy, segments)
-    assert figures.left_out["no_room"] == pytest.approx(0.5, abs=0.03)
+    figures = measure_path(surface, top, strategy, segments)
+    assert figures.left_out["no_clearance"] == pytest.approx(0.5, abs=0.03)
     assert figures.coverage == pytest.approx(0.5, abs=0.03)  # of the whole region
     assert figures.unreached < 0.01
-    assert measure(surface, top, Strategy(tool_radius_m=0.02), segments).coverage < 0.65
+    assert measure_path(surface, top, Strategy(tool_radius_m=0.02), segments).coverage < 0.65
 
 
 def test_nowhere_any_room():

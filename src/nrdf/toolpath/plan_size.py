@@ -1,4 +1,4 @@
-"""How much a strategy would plan on a region, told before it is planned: so that planning ends."""
+"""How large a plan would be, estimated before planning, so that planning always ends."""
 
 from __future__ import annotations
 
@@ -20,76 +20,79 @@ _MOST_PAIRS = 1e7  # of a place and what its footprint reaches, or of places bes
 _PARTS = (
     4.0  # of the radius, from one place of a footprint to the next (`nrdf.toolpath.sampled_path`)
 )
-_BESIDE = 2.5  # stepovers within which the next line is looked for there
+_BESIDE = 2.5  # stepovers within which the next line is samples for there
 _ROUNDED = 10.0  # places a stepover of a ring (`nrdf.toolpath.contour`)
 
 
 @dataclass(frozen=True)
-class Effort:
-    """Estimates. area: m²; way: m, of all lines of a pass; lines, waypoints: of all passes; laid:
-    places at which a pass's lines are laid out; looked: places of its footprint; pairs: of those
-    with what they reach."""
+class PlanSize:
+    """Estimates.
+
+    area: m², of the region; length: m, of all lines of a pass; lines, waypoints: of all passes;
+    nodes: points at which a pass's lines are laid out; samples: of its footprint; pairs: of those
+    samples with what they reach.
+    """
 
     area: float
-    way: float
+    length: float
     lines: float
     waypoints: float
-    laid: float
-    looked: float
+    nodes: float
+    samples: float
     pairs: float
 
 
-def effort_of(patches: Sequence[Patch], strategy: Strategy) -> Effort:
+def estimate_size(patches: Sequence[Patch], strategy: Strategy) -> PlanSize:
     """What a strategy would plan on the patches of a region, about."""
     stepover, radius = strategy.stepover_m, strategy.tool_radius_m
     points = np.array([(patch.label == OWN).sum() for patch in patches])
     spacing = np.array([patch.spacing for patch in patches])
     area = float((points * spacing**2).sum())
     sweeps = 2.0 if strategy.trajectory == "cross-hatch" else 1.0
-    way = sweeps * area / stepover
+    length = sweeps * area / stepover
     lines = sum(max(_breadth(patch, strategy) / stepover, sweeps) for patch in patches)
     round_ = strategy.trajectory in ("contour", "spiral")
-    laid = _ROUNDED * way / stepover if round_ else way / (0.5 * float(spacing.min()))
+    nodes = _ROUNDED * length / stepover if round_ else length / (0.5 * float(spacing.min()))
     step = radius / _PARTS
-    looked = way / step
+    samples = length / step
     reach = _BESIDE * stepover + step
     beside = np.pi * reach**2 / (stepover * step)
     reached = min(np.pi * radius**2 / float(spacing.min()) ** 2, points.sum())
-    return Effort(
+    return PlanSize(
         area=area,
-        way=way,
+        length=length,
         lines=strategy.passes * lines,
-        waypoints=strategy.passes * (way / strategy.spacing_m + 2.0 * lines),
-        laid=laid,
-        looked=looked,
-        pairs=looked * (min(beside, looked) + reached),
+        waypoints=strategy.passes * (length / strategy.spacing_m + 2.0 * lines),
+        nodes=nodes,
+        samples=samples,
+        pairs=samples * (min(beside, samples) + reached),
     )
 
 
-def check_effort(patches: Sequence[Patch], strategy: Strategy) -> None:
+def check_size(patches: Sequence[Patch], strategy: Strategy) -> None:
     """Raise ProcessError, saying what would be planned, for more than can be."""
-    effort = effort_of(patches, strategy)
+    size = estimate_size(patches, strategy)
     stepover = f"stepover_m {strategy.stepover_m:g} ({in_words('_m', strategy.stepover_m)})"
-    region = f"on the region's {effort.area:.3g} m²"
-    if effort.waypoints > MOST_WAYPOINTS or effort.lines > MOST_LINES:
+    region = f"on the region's {size.area:.3g} m²"
+    if size.waypoints > MOST_WAYPOINTS or size.lines > MOST_LINES:
         raise ProcessError(
-            f"about {_round(effort.waypoints)} waypoints on {_round(effort.lines)} lines would be "
+            f"about {_round(size.waypoints)} waypoints on {_round(size.lines)} lines would be "
             f"planned {region}, with {stepover}, spacing_m {strategy.spacing_m:g} "
             f"({in_words('_m', strategy.spacing_m)}) and passes {strategy.passes}; at most "
             f"{_round(MOST_WAYPOINTS)} on {_round(MOST_LINES)} are. Give more stepover_m or "
             "spacing_m, fewer passes, or cut the region into several"
         )
-    if effort.laid > _MOST_PLACES:
+    if size.nodes > _MOST_PLACES:
         raise ProcessError(
             f"{stepover} is too fine for a {strategy.trajectory} {region}: it would have to be "
-            f"laid out at about {_round(effort.laid)} places, at most {_round(_MOST_PLACES)} are. "
+            f"laid out at about {_round(size.nodes)} places, at most {_round(_MOST_PLACES)} are. "
             "Give more, or cut the region into several"
         )
-    if effort.looked > _MOST_PLACES or effort.pairs > _MOST_PAIRS:
+    if size.samples > _MOST_PLACES or size.pairs > _MOST_PAIRS:
         radius = f"{strategy.tool_radius_m:g} ({in_words('_m', strategy.tool_radius_m)})"
         raise ProcessError(
             f"tool.radius_m {radius} does not go with {stepover} {region}: lines of about "
-            f"{_round(effort.way)} m would have to be looked at {_round(effort.looked)} times to "
+            f"{_round(size.length)} m would have to be looked at {_round(size.samples)} times to "
             "tell what the footprint reaches. Give radius and stepover of one size"
         )
 

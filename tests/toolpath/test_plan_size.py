@@ -13,7 +13,7 @@ from nrdf.process.check import check_knowledge
 from nrdf.surface import surface as surface_module
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.effort import MOST_LINES, MOST_WAYPOINTS, check_passes, effort_of
+from nrdf.toolpath.plan_size import MOST_LINES, MOST_WAYPOINTS, check_passes, estimate_size
 from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import Strategy
 
@@ -54,7 +54,7 @@ def test_what_would_not_end_is_refused_at_once(box, change, message):
 def test_what_is_told_is_about_what_is_planned(box, trajectory):
     surface, region = box
     strategy = Strategy(trajectory, stepover_m=0.03, spacing_m=0.01, passes=2)
-    told = effort_of(patches_of(surface, region), strategy)
+    told = estimate_size(patches_of(surface, region), strategy)
     work = [s for s in plan(surface, region, strategy) if s.kind == "process"]
     planned = sum(len(segment.positions) for segment in work)
     assert 0.6 * planned < told.waypoints < 1.6 * planned
@@ -86,4 +86,4 @@ def test_the_same_is_found_in_parts(box, monkeypatch):
 def test_check_says_so_by_region_and_process():
     fine = {**SAND, "stepover_mm": 1e-3, "allow_unusual": True}
     (row,) = check_knowledge(bound_knowledge({"top": [fine]}))
-    assert "lines would be planned" in row.fault and row.measures is None
+    assert "lines would be planned" in row.fault and row.metrics is None

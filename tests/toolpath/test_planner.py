@@ -12,7 +12,7 @@ from builders.surfaces import SPACING, board, dome, slats, tube, two_sided
 from nrdf.errors import ProcessError
 from nrdf.shapes.families import get_family
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import measure
+from nrdf.toolpath.metrics import measure_path
 from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.strategy import TRAJECTORIES, Strategy
 from nrdf.toolpath.types import Segment
@@ -58,7 +58,7 @@ def test_what_every_path_keeps_to(shape, trajectory):
         assert length.max() < 1.6 * STRATEGY.spacing_m
         turned = Rotation.from_matrix(turns[:-1].transpose(0, 2, 1) @ turns[1:]).magnitude()
         assert turned.max() < np.radians(60)
-    found = measure(surface, region, strategy, segments)
+    found = measure_path(surface, region, strategy, segments)
     assert found.coverage > 0.99
     assert found.surface_distance_worst_m < 1e-3
     assert found.axis_error_99_rad < np.radians(1)
@@ -68,7 +68,7 @@ def test_what_every_path_keeps_to(shape, trajectory):
 def test_raster_lines_are_no_farther_apart_than_asked(shape):
     surface = Surface(*SURFACES[shape]())
     region = np.arange(surface.size)
-    found = measure(surface, region, STRATEGY, plan(surface, region, STRATEGY))
+    found = measure_path(surface, region, STRATEGY, plan(surface, region, STRATEGY))
     # A dome cannot be unrolled without stretch.
     assert found.line_spacing_worst_m < (1.2 if shape == "dome" else 1.1) * STRATEGY.stepover_m
     assert found.line_spacing_mean_m > 0.8 * STRATEGY.stepover_m

@@ -6,8 +6,8 @@ import numpy as np
 
 from nrdf.surface.patch import Patch, patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.sampled_path import _placed, line_spacing, track_of
-from nrdf.toolpath.surface_path import Line
+from nrdf.toolpath.sampled_path import _placed, line_spacing, sample_lines
+from nrdf.toolpath.surface_path import SurfacePath
 
 WIDE, THIN, LENGTH, STEPOVER = 0.06, 0.02, 0.3, 0.025
 
@@ -27,12 +27,12 @@ def bar(spacing: float = 0.017) -> Surface:
     return Surface(np.concatenate(points), np.concatenate(normals))
 
 
-def along(x: float, y: float, normal: tuple[float, float, float]) -> Line:
+def along(x: float, y: float, normal: tuple[float, float, float]) -> SurfacePath:
     z = np.linspace(0.02, LENGTH - 0.02, 27)
-    return Line(np.c_[np.full(27, x), np.full(27, y), z], np.tile(normal, (27, 1)))
+    return SurfacePath(np.c_[np.full(27, x), np.full(27, y), z], np.tile(normal, (27, 1)))
 
 
-def round_the_bar() -> list[Line]:
+def round_the_bar() -> list[SurfacePath]:
     """Lines no farther than a stepover apart round the bar, some of them close to its edges."""
     levels = (-0.027, -0.009, 0.009, 0.027)
     faces = [along(side * THIN / 2, y, (side, 0, 0)) for side in (-1.0, 1.0) for y in levels]
@@ -56,7 +56,7 @@ def test_a_line_that_is_missing_on_a_bar_is_missed():
     surface = bar()
     patches = patches_of(surface, np.arange(surface.size))
     lines = [line for k, line in enumerate(round_the_bar()) if k not in (1, 2)]
-    found = line_spacing(patches, track_of(lines, 0.025, STEPOVER), STEPOVER)
+    found = line_spacing(patches, sample_lines(lines, 0.025, STEPOVER), STEPOVER)
     assert found.distance.max() > 1.5 * STEPOVER
 
 
@@ -66,5 +66,5 @@ def test_a_line_that_faces_no_patch_is_beside_none():
     upright = [along(THIN / 2, y, (1, 0, 0)) for y in (-0.02, 0.02)]
     astray = [*upright, along(THIN / 2, 0.0, (-1, 0, 0))]
     for lines in (upright, astray):
-        found = line_spacing(patches, track_of(lines, 0.025, STEPOVER), STEPOVER)
+        found = line_spacing(patches, sample_lines(lines, 0.025, STEPOVER), STEPOVER)
         np.testing.assert_allclose(found.distance, 0.04, atol=2e-3)
