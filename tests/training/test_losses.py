@@ -69,7 +69,7 @@ def test_emd_counts_every_point_once():
 
 
 def pair(found: Inverse, **batch) -> SimpleNamespace:
-    return SimpleNamespace(match=found, batch=SimpleNamespace(**batch), z=torch.zeros(1))
+    return SimpleNamespace(transferred=found, batch=SimpleNamespace(**batch), z=torch.zeros(1))
 
 
 def test_correspondence_is_robust_and_weighted():
