@@ -21,7 +21,7 @@ from nrdf.io.result_folder import MANIFEST
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.transfer_result import MIN_CONFIDENCE
 
-VERBS = sorted(cli.verbs())
+VERBS = sorted(set(cli.verbs()) - set(cli.GROUPS))
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +68,13 @@ def test_help_lists_every_verb_and_imports_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
     assert lines[-1] == "[]"
-    for verb in VERBS:
+    for verb in cli.verbs():
         assert any(line.startswith(f"  {verb} ") for line in lines)
 
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_explains_itself_with_an_example(verb, capsys):
-    with pytest.raises(SystemExit) as ended:
-        cli.run([verb, "--help"])
-    assert ended.value.code == 0
+    assert cli.run([verb, "--help"]) == 0
     assert f"Example: nrdf {verb}" in capsys.readouterr().out
 
 
@@ -84,9 +82,7 @@ def test_every_verb_explains_itself_with_an_example(verb, capsys):
     "group, verb", [(group, verb) for group in cli.GROUPS for verb in cli.verbs()[group]()]
 )
 def test_every_verb_of_a_group_explains_itself_with_an_example(group, verb, capsys):
-    with pytest.raises(SystemExit) as ended:
-        cli.run([group, verb, "--help"])
-    assert ended.value.code == 0
+    assert cli.run([group, verb, "--help"]) == 0
     assert f"Example: nrdf {group} {verb}" in capsys.readouterr().out
 
 
@@ -308,7 +304,7 @@ def test_info_as_json(capsys):
 
 def test_zoo_add_parses_scores(untrained, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("nrdf.field.zoo.add_to_zoo.__defaults__", (None, None, "", tmp_path))
-    words = ["zoo", "add", str(untrained), "--name", "mine", "--scores", "a=0.5", "b=2"]
+    words = ["model", "add", str(untrained), "--name", "mine", "--scores", "a=0.5", "b=2"]
     assert cli.run(words) == 0
     index = json.loads((tmp_path / "index.json").read_text())
     assert index["models"]["mine"]["scores"] == {"own": 0.5, "a": 0.5, "b": 2.0}
@@ -329,7 +325,7 @@ def test_prepare_names_what_it_cannot_use_and_goes_on(tmp_path, capsys):
     meshes.mkdir()
     trimesh.creation.box((0.5, 1.0, 0.7)).export(meshes / "box.ply")
     (meshes / "broken.obj").write_text("f 1 2 3")
-    words = f"prepare {meshes} --category chair --out {tmp_path}/data --workers 1 "
+    words = f"model prepare {meshes} --category chair --out {tmp_path}/data --workers 1 "
     words += "--surface-points 500 --queries 500"
     for made, kept in ((1, 0), (0, 1)):
         assert cli.run(words.split()) == 1
@@ -338,7 +334,7 @@ def test_prepare_names_what_it_cannot_use_and_goes_on(tmp_path, capsys):
         assert "not used: broken.obj: " in said.err
     (meshes / "broken.obj").unlink()
     assert cli.run(words.split()) == 0
-    assert cli.run(["prepare", str(tmp_path / "none"), *words.split()[2:]]) == 2
+    assert cli.run(["model", "prepare", str(tmp_path / "none"), *words.split()[3:]]) == 2
 
 
 def test_prepared_shapes_train_a_field_that_the_other_verbs_take(tmp_path, capsys):
@@ -348,7 +344,7 @@ def test_prepared_shapes_train_a_field_that_the_other_verbs_take(tmp_path, capsy
     meshes.mkdir()
     for i in range(3):
         trimesh.creation.box((0.5, 1.0, 0.3 + 0.2 * i)).export(meshes / f"box-{i}.ply")
-    words = f"prepare {meshes} --category chair --out {data} --workers 1 --surface-points 300"
+    words = f"model prepare {meshes} --category chair --out {data} --workers 1 --surface-points 300"
     assert cli.run([*words.split(), "--queries", "300"]) == 0
     config = tmp_path / "tiny.yaml"
     config.write_text(
@@ -357,9 +353,9 @@ def test_prepared_shapes_train_a_field_that_the_other_verbs_take(tmp_path, capsy
         "stages: [{name: all, weights: {occupancy: 1}, steps: 2, batch_size: 2}]\n"
     )
     words = f"--data {data} --config {config} --device cpu --out"
-    assert cli.run(f"train car {words} {tmp_path}/car".split()) == 2
+    assert cli.run(f"model train car {words} {tmp_path}/car".split()) == 2
     assert "of category chair, not car" in capsys.readouterr().err
-    assert cli.run(f"train chair {words} {run}".split()) == 0
+    assert cli.run(f"model train chair {words} {run}".split()) == 0
     assert f"--model {run}/weights.safetensors" in capsys.readouterr().out
     assert find_weights(run) == run / "weights.safetensors"
     assert load_field(run)[1]["category"] == "chair"
@@ -381,8 +377,8 @@ def test_synth_and_correspond_pass_on_what_is_asked(tmp_path, monkeypatch, capsy
 
     monkeypatch.setattr("nrdf.shapes.synth.synthesise", synthesise)
     monkeypatch.setattr("nrdf.shapes.correspond.correspond_folders", correspond_folders)
-    assert cli.run(f"synth car --count 7 --seed 3 --out {tmp_path}".split()) == 0
-    words = f"correspond {tmp_path} other --templates 2 --templates-from other"
+    assert cli.run(f"model synth car --count 7 --seed 3 --out {tmp_path}".split()) == 0
+    words = f"model correspond {tmp_path} other --templates 2 --templates-from other"
     assert cli.run(words.split()) == 0
     assert asked == [("car", 7, tmp_path, 3), ([tmp_path, Path("other")], 2, Path("other"))]
     said = capsys.readouterr().out

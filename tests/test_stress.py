@@ -115,8 +115,8 @@ def test_a_place_that_can_only_be_read_is_told_before_anything_is_computed(job, 
     for words in (
         ["export", job, "--format", "csv", "--out", job / "file" / "out"],
         ["demo", "--out", job / "file" / "out"],
-        ["scan", "no-such-mesh.ply", "--out", job / "file" / "out.ply"],
-        ["synth", "chair", "--count", "1", "--out", job / "file" / "out"],
+        ["model", "scan", "no-such-mesh.ply", "--out", job / "file" / "out.ply"],
+        ["model", "synth", "chair", "--count", "1", "--out", job / "file" / "out"],
         ["eval", "presence", "--out", job / "file" / "out"],
         ["eval", "speed", "--out", job / "file" / "speed.json"],
     ):
@@ -132,14 +132,14 @@ def test_a_place_that_can_only_be_read_is_told_before_anything_is_computed(job, 
         ["export", "JOB", "--format", "csv", "--overwrite"],
         ["retrieve", "--model", "x", "--reference", "x", "--region", "x", "--target", "x"],
         ["align", "scan.ply", "--model", "x"],
-        ["transfer", "x.yaml", "--target", "x.ply"],
+        ["transfer", "x.yaml", "x.ply"],
         ["simulate", "JOB"],
         ["demo"],
-        ["scan", "mesh.ply"],
-        ["knowledge", "new", "--reference", "x.ply", "--category", "chair"],
-        ["synth", "chair", "--count", "1"],
-        ["prepare", "meshes", "--category", "chair"],
-        ["boxes", "x.npz", "--category", "chair", "--count", "1"],
+        ["model", "scan", "mesh.ply"],
+        ["teach", "--reference", "x.ply", "--category", "chair"],
+        ["model", "synth", "chair", "--count", "1"],
+        ["model", "prepare", "meshes", "--category", "chair"],
+        ["model", "boxes", "x.npz", "--category", "chair", "--count", "1"],
         ["eval", "bsrc", "--data", "x", "--category", "chair"],
         ["eval", "objects", "--data", "x"],
         ["eval", "shape", "--data", "x"],
@@ -185,7 +185,10 @@ def test_a_job_inside_out_is_refused(job, capsys):
 
 def test_a_scan_over_its_own_mesh_is_refused(tmp_path, capsys):
     (tmp_path / "mesh.ply").write_text("precious")
-    assert cli.run(["scan", str(tmp_path / "mesh.ply"), "--out", str(tmp_path / "mesh.ply")]) == 2
+    assert (
+        cli.run(["model", "scan", str(tmp_path / "mesh.ply"), "--out", str(tmp_path / "mesh.ply")])
+        == 2
+    )
     assert "is read, and would be overwritten" in " ".join(capsys.readouterr().err.split())
     assert (tmp_path / "mesh.ply").read_text() == "precious"
 
@@ -194,7 +197,7 @@ def test_a_scan_and_its_truth_are_as_they_were_where_writing_fails(tmp_path, mon
     import trimesh
 
     trimesh.creation.box((0.5, 0.6, 0.9)).export(tmp_path / "box.ply")
-    words = f"scan {tmp_path}/box.ply --pixels 40 --out {tmp_path}/scan.ply".split()
+    words = f"model scan {tmp_path}/box.ply --pixels 40 --out {tmp_path}/scan.ply".split()
     assert cli.run(words) == 0
     before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
     assert set(before) == {"box.ply", "scan.ply", "scan.json"}
@@ -278,7 +281,7 @@ def test_regions_that_would_be_one_file_are_refused(tmp_path, capsys):
 
 def test_a_second_studio_and_a_second_writer_of_a_data_folder_are_refused(tmp_path, capsys):
     place = str(tmp_path / "place")
-    for words in (["studio", "--no-browser", "--session", place], ["correspond", place]):
+    for words in (["studio", "--no-browser", "--session", place], ["model", "correspond", place]):
         with write_lock(place):
             assert cli.run(words) == 2
         assert "another run is writing to" in " ".join(capsys.readouterr().err.split())

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import logging
 import os
-import re
 import sys
-import typing
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import entry_points
 from typing import Any
@@ -16,96 +12,45 @@ from typing import Any
 import nrdf
 from nrdf.errors import ConfigError, NrdfError
 
+Verb = Callable[..., Any]
+
 USAGE = """usage: nrdf VERB ... [-v]
 
-Teach a region once, on one object, and find it on every object of that kind.
+Teach a surface process once, on one object; run it on every object of that kind.
 """
 NOTES = """
-Every verb explains itself, with an example:  nrdf VERB --help
--v shows debug messages; nrdf --version the version.
-Ends with 0 where all is well; 1 where some shapes could not be used; 2 for bad
-input, with a message that says what to do; 3 where a limit is not met, or with
---strict where anything is doubtful; 4 where nothing was found or could be
-planned; 130 after Ctrl-C. With 3 and 4 the result is written all the same."""
+An example and all options: nrdf VERB --help. Debug messages: -v. nrdf --version.
+Ends with 0: all well; 1: some shapes not used; 2: bad input, and what to do; 3: a
+limit is not met, or doubtful with --strict; 4: nothing found or planned; 130: Ctrl-C.
+With 3 and 4 the result is written all the same."""
 
-RESUMABLE = (
-    "synth",
-    "prepare",
-    "boxes",
-    "correspond",
-    "train",
-    "yaw",
-    "kind",
-    "eval bsrc",
-    "eval presence",
-    "ablate",
-)
-GROUPS = ("eval", "knowledge")
+GROUPS = ("model", "eval")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 BENCHMARK = ("eval", "ablate")
 """Verbs that come with `nrdf_benchmark`."""
+RESUMABLE = (
+    "ablate", "eval bsrc", "eval presence", "model boxes", "model correspond", "model kind",
+    "model prepare", "model synth", "model train", "model yaw",
+)  # fmt: skip
+"""Verbs that go on where they were when the same command is given again."""
 
 
-def verbs() -> dict[str, Callable[..., Any]]:
+def verbs() -> dict[str, Verb]:
     """Name to function; their modules import nothing heavy."""
     from nrdf.commands.align import align
+    from nrdf.commands.check import check
+    from nrdf.commands.demo import demo
     from nrdf.commands.export import export
-    from nrdf.commands.information import info, zoo
-    from nrdf.commands.kind import kind
-    from nrdf.commands.knowledge import knowledge
+    from nrdf.commands.info import info
+    from nrdf.commands.model import model
     from nrdf.commands.retrieve import retrieve
-    from nrdf.commands.scan import scan
-    from nrdf.commands.shapes import boxes, correspond, prepare, synth
-    from nrdf.commands.show import demo
     from nrdf.commands.simulate import simulate
     from nrdf.commands.studio import studio
-    from nrdf.commands.train import train
+    from nrdf.commands.teach import teach
     from nrdf.commands.transfer import transfer
-    from nrdf.commands.yaw import yaw
 
-    return {
-        "retrieve": retrieve,
-        "align": align,
-        "knowledge": knowledge,
-        "transfer": transfer,
-        "export": export,
-        "simulate": simulate,
-        "demo": demo,
-        "studio": studio,
-        "info": info,
-        "scan": scan,
-        "synth": synth,
-        "prepare": prepare,
-        "boxes": boxes,
-        "correspond": correspond,
-        "train": train,
-        "yaw": yaw,
-        "kind": kind,
-        "zoo": zoo,
-        **_verbs_of_other_packages(),
-    }
-
-
-def _verbs_of_other_packages() -> dict[str, Callable[..., Any]]:
-    """Verbs that installed packages add, as entry points of the group `nrdf.commands`."""
-    found: dict[str, Callable[..., Any]] = {}
-    for point in entry_points(group="nrdf.commands"):
-        try:
-            found[point.name] = point.load()
-        except ModuleNotFoundError as error:
-            # A package that is not there adds nothing; what fails inside one is a fault to see.
-            if error.name != point.module.partition(".")[0]:
-                raise
-    return found
-
-
-def _refuse_missing_benchmark(verb: str, known: Mapping[str, Any]) -> None:
-    """Raises ConfigError for a verb of the benchmark where `nrdf_benchmark` is not installed."""
-    if verb in BENCHMARK and verb not in known:
-        raise ConfigError(
-            f"`nrdf {verb}` is part of nrdf_benchmark, which is not installed; "
-            "pip install 'nrdf[benchmark]'"
-        )
+    own = (teach, check, transfer, retrieve, align, export, simulate, studio, demo, info, model)
+    return {**{verb.__name__: verb for verb in own}, **_verbs_of_other_packages()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -120,13 +65,7 @@ def run(given: list[str], verbose: bool = False) -> int:
     """Run one command; the exit code."""
     _configure_logging(verbose)
     try:
-        if given in ([], ["-h"], ["--help"]):
-            _show_verbs()
-            return 0
-        if given == ["--version"]:
-            _say(f"nrdf {nrdf.__version__}")
-            return 0
-        return _parse(_with_axes_joined(given)) or 0
+        return _run(_with_axes_joined(given))
     except NrdfError as error:
         _complain(str(error))
         return error.exit_code
@@ -145,29 +84,64 @@ def run(given: list[str], verbose: bool = False) -> int:
         return 130
 
 
+def _run(given: list[str]) -> int:
+    if given in ([], ["-h"], ["--help"]):
+        _show_verbs()
+        return 0
+    if given == ["--version"]:
+        _say(f"nrdf {nrdf.__version__}")
+        return 0
+    known, prog = verbs(), "nrdf"
+    verb, words = _find(given[0], known), given[1:]
+    if given[0] in GROUPS:
+        prog, group, known = f"nrdf {given[0]}", verb, verb()
+        if words in ([], ["-h"], ["--help"]):
+            _show_group(prog, group, known)
+            return 0
+        given = words
+        verb, words = _find(given[0], known, prog), given[1:]
+    from nrdf.commands.parser import parse
+
+    call = parse(verb, f"{prog} {given[0]}", words)
+    return (call() or 0) if call else 0
+
+
+def _find(word: str, known: Mapping[str, Verb], prog: str = "nrdf") -> Verb:
+    """The verb of that name. Raises ConfigError with the nearest for one that is not known."""
+    from nrdf.commands.parser import closest
+
+    if word in known:
+        return known[word]
+    if word in BENCHMARK:
+        raise ConfigError(
+            f"`nrdf {word}` is part of nrdf_benchmark, which is not installed; "
+            "pip install 'nrdf[benchmark]'"
+        )
+    if prog == "nrdf":
+        within = [group for group in GROUPS if group in known and word in known[group]()]
+        also = f"; did you mean '{within[0]} {word}'?" if within else closest(word, known)
+        raise ConfigError(f"no verb '{word}'{also}\nsee nrdf --help")
+    also = closest(word, known) or f"; known: {', '.join(known)}"
+    raise ConfigError(f"{prog} has no verb '{word}'{also}\nsee {prog} --help")
+
+
+def _verbs_of_other_packages() -> dict[str, Verb]:
+    """Verbs that installed packages add, as entry points of the group `nrdf.commands`."""
+    found: dict[str, Verb] = {}
+    for point in entry_points(group="nrdf.commands"):
+        try:
+            found[point.name] = point.load()
+        except ModuleNotFoundError as error:
+            # A package that is not there adds nothing; what fails inside one is a fault to see.
+            if error.name != point.module.partition(".")[0]:
+                raise
+    return found
+
+
 def _resumable(given: list[str]) -> bool:
     # What `nrdf eval` measures is kept only where there is a folder for it.
-    kept = given[0] not in GROUPS or any(word.partition("=")[0] == "--out" for word in given)
+    kept = given[0] != "eval" or any(word.partition("=")[0] == "--out" for word in given)
     return kept and (given[0] in RESUMABLE or " ".join(given[:2]) in RESUMABLE)
-
-
-def _parse(given: list[str]) -> int | None:
-    """Parse and run, one level deeper where the verb is a group."""
-    import tyro
-
-    known, prog, description = verbs(), "nrdf", None
-    _refuse_missing_benchmark(given[0], known)
-    if given[0] in GROUPS:
-        group = known[given[0]]
-        known, prog, description = group(), f"nrdf {given[0]}", inspect.getdoc(group)
-        given = given[1:]
-    return tyro.extras.subcommand_cli_from_dict(
-        {name: _with_checked_numbers(_with_joined_lines(verb)) for name, verb in known.items()},
-        prog=prog,
-        description=description,
-        args=given,
-        config=(tyro.conf.FlagCreatePairsOff,),
-    )
 
 
 def _with_axes_joined(given: list[str]) -> list[str]:
@@ -182,44 +156,32 @@ def _with_axes_joined(given: list[str]) -> list[str]:
 
 
 def _show_verbs() -> None:
-    from nrdf.commands.console import show, table
-
-    shown = table("", "", "")
-    for name, verb in verbs().items():
-        shown.add_row(f"  {name}", (verb.__doc__ or "").partition("\n")[0])
     _say(USAGE)
-    show(shown)
+    for name, verb in verbs().items():
+        if name not in GROUPS:
+            _say(f"  {name:9} {_first_line(verb)}")
+    for name, group in verbs().items():
+        if name in GROUPS:
+            _say(f"  {name:9} {_first_line(group)}")
     _say(NOTES)
+
+
+def _show_group(prog: str, group: Verb, known: Mapping[str, Verb]) -> None:
+    _say(f"usage: {prog} VERB ...\n\n{_first_line(group)}\n")
+    width = max(map(len, known))
+    for name, verb in known.items():
+        _say(f"  {name:{width}}  {_first_line(verb)}")
+    _say(f"\nAn example and all options: {prog} VERB --help.")
+
+
+def _first_line(verb: Verb) -> str:
+    return (verb.__doc__ or "").partition("\n")[0]
 
 
 def _say(what: Any) -> None:
     from nrdf.commands.console import console
 
     console.print(what)
-
-
-def _with_joined_lines(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """The verb, its docstring's arguments on one line each: tyro would keep the line breaks."""
-    verb.__doc__ = re.sub(r"\n {12}", " ", verb.__doc__ or "")
-    return verb
-
-
-def _with_checked_numbers(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """The verb, called only with numbers that are within its annotations' bounds."""
-    from nrdf.io.bounds import check_numbers
-
-    @functools.wraps(verb)
-    def checked(*given: Any, **named: Any) -> Any:
-        values = inspect.signature(verb).bind(*given, **named).arguments
-        hints = typing.get_type_hints(verb, include_extras=True)
-        flags = {name: f"--{name.replace('_', '-')}" for name in values}
-        check_numbers(
-            {flags[name]: value for name, value in values.items()},
-            {flags[name]: hints[name] for name in values},
-        )
-        return verb(*given, **named)
-
-    return checked
 
 
 def _complain(message: str) -> None:

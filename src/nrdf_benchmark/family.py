@@ -13,7 +13,7 @@ from nrdf.regions.model import Model
 from nrdf.shapes.families import get_family
 
 FIRST_SEED = 1_000_000
-"""Members from this seed on are never trained on (`nrdf synth` starts at 0)."""
+"""Members from this seed on are never trained on (`nrdf model synth` starts at 0)."""
 CLOUD_POINTS = 8192
 PLACES = 2048
 

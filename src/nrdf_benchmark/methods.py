@@ -169,7 +169,7 @@ def _trained(name: str, entry: Entry, category: str, runs: Path) -> Path:
     if not path.is_file():
         raise ModelError(
             f"no weights of method '{name}' for category {category}: expected {path}; train them "
-            f"(nrdf train {category} --preset {entry.run}-short --data data/{category} --out "
+            f"(nrdf model train {category} --preset {entry.run}-short --data data/{category} --out "
             f"{run}), give the folder of the runs (--runs) or the file (--model {name}=PATH)"
         )
     return path

@@ -1,6 +1,6 @@
 """From a file to robot programs: every step of a transfer between labelled objects, and its end.
 
-A part of a reference is a region with one process on it, as `nrdf knowledge new` writes it; the
+A part of a reference is a region with one process on it, as `nrdf teach` writes it; the
 target is a mesh file. Nothing is simulated.
 """
 

@@ -153,8 +153,8 @@ def find_shapes(folder: Path, split: str = "test") -> tuple[str, list[Path]]:
     paths = shape_paths(folder, split)
     if not paths:
         raise DataError(
-            f"{folder} has no shapes of the split '{split}'; prepare some (nrdf prepare MESHES "
-            "--category CATEGORY --index INDEX --out FOLDER, the index a table whose column split "
+            f"{folder} has no shapes of the split '{split}'; prepare some (nrdf model prepare "
+            "MESHES --category CATEGORY --index INDEX, the index a table whose column split "
             f"says {split}), or score those of another split with --split"
         )
     return read_shape(paths[0]).category, paths

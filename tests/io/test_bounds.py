@@ -9,6 +9,7 @@ from typing import Annotated
 import pytest
 
 from nrdf import cli
+from nrdf.commands.parser import checked_call
 from nrdf.errors import ConfigError
 from nrdf.io.bounds import FINITE, FRACTION, Bounds, Count, Fraction, Seed, check_numbers
 from nrdf.process.limits import Limits
@@ -40,7 +41,7 @@ def call(verb, **given):
     """Call a verb as the command line does, with None for what else it needs."""
     parameters = inspect.signature(verb).parameters.items()
     needed = {name: None for name, p in parameters if p.default is inspect.Parameter.empty}
-    cli._with_checked_numbers(verb)(**{**needed, **given})
+    checked_call(verb, {**needed, **given})
 
 
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
@@ -59,8 +60,8 @@ def test_no_verb_takes_a_count_below_0(verb, name, several):
 
 def test_the_walk_over_the_verbs_finds_what_it_is_for():
     found = {param.id for param in (*numeric(float), *numeric(int))}
-    assert {"transfer --min_coverage", "transfer --sensor", "scan --noise"} <= found
-    assert {"scan --views", "eval bsrc --workers", "simulate --shift_mm"} <= found
+    assert {"transfer --min_coverage", "transfer --sensor", "model scan --noise"} <= found
+    assert {"model scan --views", "eval bsrc --workers", "simulate --shift_mm"} <= found
 
 
 @pytest.mark.parametrize(
@@ -75,7 +76,7 @@ def test_the_walk_over_the_verbs_finds_what_it_is_for():
     ],
 )
 def test_a_limit_that_never_breaks_ends_with_2(tmp_path, capsys, words, message):
-    given = f"transfer k.yaml --target t.ply --out {tmp_path}/job {words}"
+    given = f"transfer k.yaml t.ply --out {tmp_path}/job {words}"
     assert cli.run(given.split()) == 2
     assert message in capsys.readouterr().err
 

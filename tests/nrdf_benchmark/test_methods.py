@@ -68,7 +68,7 @@ def test_missing_weights_are_named_with_the_command_that_makes_them(tmp_path, na
     said = str(raised.value)
     assert f"no weights of method '{name}' for category plane: expected {tmp_path}" in said
     assert f"plane-{run}/weights.safetensors" in said
-    assert f"nrdf train plane --preset {run}-short --data data/plane --out {tmp_path}" in said
+    assert f"nrdf model train plane --preset {run}-short --data data/plane --out {tmp_path}" in said
 
 
 def test_weights_of_another_category_or_preset_are_refused(tmp_path):

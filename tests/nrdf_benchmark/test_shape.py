@@ -199,7 +199,8 @@ def test_the_command_prints_the_table_or_says_what_is_missing(data, untrained, t
     assert (tmp_path / "out/table1-chair.json").is_file()
     assert shape("--model", untrained) == 2
     assert (
-        "has no shapes of the split 'test'; prepare some (nrdf prepare" in capsys.readouterr().err
+        "has no shapes of the split 'test'; prepare some (nrdf model prepare"
+        in capsys.readouterr().err
     )
     assert shape("--split", "val", "--method", "nrdf-paper", "--runs", tmp_path) == 2
     assert "no weights of method 'nrdf-paper' for category chair" in capsys.readouterr().err

@@ -281,7 +281,7 @@ def test_yaml_that_is_broken_or_hostile_is_refused(text, message):
 
 
 def test_a_missing_file_and_one_that_is_no_text(tmp_path):
-    with pytest.raises(ProcessError, match="nrdf knowledge new"):
+    with pytest.raises(ProcessError, match="nrdf teach"):
         read_knowledge(tmp_path / "none.yaml")
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ProcessError, match="no text in UTF-8"):

@@ -170,7 +170,7 @@ def test_upright_and_axes():
 
 def test_the_command_writes_the_scan_and_the_truth(tmp_path, capsys):
     BALL.export(tmp_path / "ball.ply")
-    words = ["scan", tmp_path / "ball.ply", "--out", tmp_path / "scan.ply", "--pixels", 40,
+    words = ["model", "scan", tmp_path / "ball.ply", "--out", tmp_path / "scan.ply", "--pixels", 40,
              "--views", 2, "--floor", "--scale", 10, "--offset", 1, 2, 3, "--unit", "mm",
              "--normals", "--yaw", 90]  # fmt: skip
     assert cli.run([str(word) for word in words]) == 0

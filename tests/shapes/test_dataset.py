@@ -146,5 +146,5 @@ def test_a_wrong_index_is_refused(tmp_path, text, message):
 
 
 def test_a_folder_without_index_says_what_makes_one(tmp_path):
-    with pytest.raises(DataError, match="nrdf prepare"):
+    with pytest.raises(DataError, match="nrdf model prepare"):
         read_index(tmp_path)

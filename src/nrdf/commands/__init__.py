@@ -1,1 +1,4 @@
-"""The command line's verbs, one function each; what they need is imported when they run."""
+"""The verbs of the command line: words in, files and tables out, one verb per module.
+
+What a verb needs is imported when it runs, so `nrdf --help` needs no torch.
+"""

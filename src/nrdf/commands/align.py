@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 from tyro.conf import Positional
 
@@ -18,30 +16,26 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
+from nrdf.commands.options import File, Folder, Sensors, Skip, Unit, Up
+from nrdf.commands.scan_input import ScanOptions, describe_alignment, read_scan, warn_of_scan
 
 if TYPE_CHECKING:
-    from nrdf.io.cloud import PointCloud
-    from nrdf.regions.model import Model
     from nrdf.scans.aligned_scan import AlignedScan
     from nrdf.viz.picture import Panel
 
-log = logging.getLogger(__name__)
-
-Unit = Literal["m", "cm", "mm", "in"]
-Skip = Literal["thin", "duplicates", "floor", "outliers", "objects"]
 MOST_POSES = 3  # that a picture shows
 
 
 def align(
-    scan: Positional[Path],
+    scan: Positional[File],
     model: str,
-    out: Path,
-    up: str = "auto",
-    sensor: tuple[float, ...] = (),
+    out: Folder | None = None,
+    up: Up = "auto",
+    sensor: Sensors = (),
     unit: Unit | None = None,
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
-    reference: tuple[Path, ...] = (),
+    reference: tuple[File, ...] = (),
     device: str = "cpu",
     strict: bool = False,
     overwrite: bool = False,
@@ -54,12 +48,12 @@ def align(
     what was kept, in the scan's frame; aligned.ply, the same with +X forward and +Y up, its longest
     side 1; picture.png.
 
-    Example: nrdf align scan.ply --model chair --up z --out aligned/
+    Example: nrdf align scan.ply --model chair --up z
 
     Args:
         scan: Point cloud or mesh, or a ROS 2 bag, of one object, in any pose and unit.
         model: Name in the zoo (see `nrdf info`), weight file, or training run's folder.
-        out: Folder to write; made if missing.
+        out: Folder to write; aligned-NAME unless given.
         up: Direction in the scan that points up: x, y, z, -x, -y, -z, or 'x y z'; auto takes the
             floor's, or tries the axes, which takes longer.
         sensor: Where the sensors stood: x y z of each, in the scan's frame and unit. The file may
@@ -76,6 +70,7 @@ def align(
     """
     from nrdf.io.output import output_folder
 
+    out = out or Path(f"aligned-{scan.stem}")
     with output_folder(out, overwrite, [scan, *reference, model]) as folder:
         import nrdf
         from nrdf.io.cloud import PointCloud
@@ -83,8 +78,8 @@ def align(
 
         loaded = nrdf.load_model(model, device)
         examples = [nrdf.read_cloud(path) for path in reference]
-        found = read_scan(loaded, scan, up, sensor, unit, skip, topic, examples)
-        warn_of_doubts(found, scan)
+        found = read_scan(loaded, scan, ScanOptions(up, sensor, unit, skip, topic), examples)
+        warn_of_scan(found, scan)
         best, cleaned = found.alignment.best, found.cleaned
         points = best.pose.to_canonical(cleaned.cloud.points)
         nrdf.write_cloud(folder / "aligned.ply", PointCloud(points, frame=loaded.category))
@@ -101,91 +96,6 @@ def align(
     show_alignment(found)
     console.print(f"results, report and picture in {out}")
     return 3 if strict and found.warnings else 0
-
-
-def read_scan(
-    model: Model,
-    path: Path,
-    up: str,
-    sensor: tuple[float, ...] = (),
-    unit: str | None = None,
-    skip: tuple[str, ...] = (),
-    topic: str | None = None,
-    examples: Sequence[PointCloud] = (),
-) -> AlignedScan:
-    """Read, clean and align a scan by a command's options.
-
-    `examples` of the category stand in for members of its family where there are any. Raises
-    CloudError for options without sense, an unreadable scan, or one without an object.
-    """
-    import numpy as np
-
-    import nrdf
-    from nrdf.errors import CloudError
-
-    if len(sensor) % 3:
-        raise CloudError(
-            f"--sensor has {len(sensor)} numbers; three are needed for each sensor: x y z"
-        )
-    places = np.array(sensor, float).reshape(-1, 3) if sensor else None
-    cloud = nrdf.read_cloud(path, topic=topic)
-    return nrdf.align(model, cloud, up, places, unit, skip, examples)
-
-
-def stand_ins(model: Model, reference: PointCloud) -> list[PointCloud]:
-    """Examples to align by: none where the category has a family, else the reference."""
-    from nrdf.shapes.families import FAMILY_NAMES
-
-    return [] if model.category in FAMILY_NAMES else [reference]
-
-
-def warn_of_doubts(found: AlignedScan, path: Path) -> None:
-    """Log every doubt about a scan as a warning, and a guess of its unit."""
-    if found.unit.origin == "guessed":
-        log.info("%s: the unit is guessed to be %s", path, found.unit.name)
-    warn_of(found.warnings, path)
-
-
-def warn_of(doubts: Sequence[str], path: Path) -> None:
-    """Log doubts about a file as warnings."""
-    for doubt in doubts:
-        log.warning("%s: %s", path, doubt)
-
-
-def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
-    """What a report says of a scan's cleaning and alignment."""
-    import numpy as np
-
-    best, unit = found.alignment.best, found.unit
-    sensors = found.scan.sensors
-    return {
-        "T_scan_canonical": best.pose.T_scan_canonical,
-        "scale": best.pose.scale,
-        "probability": round(best.probability, 4),
-        "cost": round(best.cost, 4),
-        "field_cost": round(best.field_cost, 4),
-        "usual_cost": round(found.scorer.usual_cost, 4),
-        "kind": found.kind.describe(),
-        "doubts": found.warnings,
-        "unit": {"name": unit.name, "origin": unit.origin},
-        "sensors": None if sensors is None else sensors,
-        "candidates": [
-            {
-                "T_scan_canonical": c.pose.T_scan_canonical,
-                "scale": c.pose.scale,
-                "up": c.up,
-                "yaw_degrees": round(float(np.degrees(c.yaw)), 2),
-                "cost": round(c.cost, 4),
-                "field_cost": round(c.field_cost, 4),
-                "probability": round(c.probability, 4),
-                "symmetry": round(c.symmetry, 3),
-            }
-            for c in found.alignment.candidates
-        ],
-        "cleaning": [vars(step) for step in found.cleaned.steps],
-        "points": {"scan": len(found.scan), "object": len(found.cleaned.cloud)},
-        "seconds_of_alignment": {k: round(v, 4) for k, v in found.alignment.seconds.items()},
-    }
 
 
 def pose_panels(found: AlignedScan) -> list[Panel]:

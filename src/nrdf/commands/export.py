@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 
 from tyro.conf import OmitArgPrefixes, Positional
 
 from nrdf.commands.console import command_line, console, show, table, write_report
+from nrdf.commands.options import Folder
 from nrdf.export.options import Options
 
 
 def export(
-    job: Positional[Path],
+    job: Positional[Folder],
     format: tuple[str, ...],
-    out: Path | None = None,
+    out: Folder | None = None,
     programs: OmitArgPrefixes[Options] = Options(),  # noqa: B008
     overwrite: bool = False,
 ) -> None:
@@ -28,7 +28,7 @@ def export(
     Args:
         job: Folder that `nrdf transfer` wrote, with toolpaths.json in it.
         format: One or more formats.
-        out: Folder to write; the folder export in the job's unless given.
+        out: Folder to write; JOB/export unless given.
         programs: Choices about what is written.
         overwrite: Replace an earlier result in the output folder.
     """

@@ -1,4 +1,4 @@
-"""Verbs that write to a place over a long time: one run at a time."""
+"""Only one run at a time writes to a place."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ Result = TypeVar("Result")
 
 
 def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """A decorator: where the argument `name` gives a place, or several, no other run writes there.
+    """A decorator: the verb keeps other runs out of the place that its argument `name` gives.
 
-    A second one is refused at once, before anything is computed, and so is a place that cannot be
-    written (`nrdf.io.locks.write_lock`).
+    The argument may also give several places, or None. OutputError is raised at once, before
+    anything is computed, if another run writes there or it cannot be written
+    (`nrdf.io.locks.write_lock`).
     """
 
     def decorate(verb: Callable[Arguments, Result]) -> Callable[Arguments, Result]:

@@ -8,15 +8,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from nrdf.commands.align import (
-    Skip,
-    Unit,
-    describe_alignment,
-    read_scan,
-    stand_ins,
-    warn_of,
-    warn_of_doubts,
-)
 from nrdf.commands.console import (
     command_line,
     console,
@@ -26,7 +17,16 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
-from nrdf.errors import CloudError, NothingFoundError
+from nrdf.commands.options import File, Folder, Sensors, Skip, Unit, Up
+from nrdf.commands.scan_input import (
+    ScanOptions,
+    alignment_examples,
+    describe_alignment,
+    read_scan,
+    warn_of,
+    warn_of_scan,
+)
+from nrdf.errors import NothingFoundError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,14 +41,14 @@ log = logging.getLogger(__name__)
 
 def retrieve(
     model: str,
-    reference: Path,
-    region: tuple[Path, ...],
-    target: Path,
-    out: Path,
+    reference: File,
+    region: tuple[File, ...],
+    target: File,
+    out: Folder | None = None,
     method: Literal["mask", "points"] = "mask",
     refine: bool = False,
-    up: str | None = None,
-    sensor: tuple[float, ...] = (),
+    up: Up | None = None,
+    sensor: Sensors = (),
     unit: Unit | None = None,
     skip: tuple[Skip, ...] = (),
     topic: str | None = None,
@@ -68,7 +68,7 @@ def retrieve(
     with 4, after writing.
 
     Example: nrdf retrieve --model chair --reference ref.ply --region seat.ply back.ply --target
-    new.ply --out result/
+    new.ply
 
     Args:
         model: Name in the zoo (see `nrdf info`), weight file, or training run's folder.
@@ -79,7 +79,7 @@ def retrieve(
             of such arrays, one a region.
         target: Cloud or mesh of the object to find them on, in the same frame, or in any with --up;
             any unit.
-        out: Folder to write; made if missing.
+        out: Folder to write; regions-NAME, by the target's name, unless given.
         method: mask: each target point asks the mapped reference points nearest to it;
             points: each region point's prediction is snapped to the target (the paper's).
         refine: Move the mapped reference onto the target in a few steps first, about half a second
@@ -97,6 +97,8 @@ def retrieve(
     """
     from nrdf.io.output import output_folder
 
+    out = out or Path(f"regions-{target.stem}")
+    options = ScanOptions(up, sensor, unit, skip, topic)
     doubts: list[str] = []
     with output_folder(out, overwrite, [reference, *region, target, model]) as folder:
         clock = Clock()
@@ -109,13 +111,12 @@ def retrieve(
         reference_cloud = nrdf.read_cloud(reference)
         scan = None
         if up is None:
-            if sensor or unit or skip:
-                raise CloudError("--sensor, --unit and --skip are for scans: give --up")
+            options.refuse_without_up("sensor", "unit", "skip")
             target_cloud = nrdf.read_cloud(target, topic=topic)
         else:
-            examples = stand_ins(loaded, reference_cloud)
-            scan = read_scan(loaded, target, up, sensor, unit, skip, topic, examples)
-            warn_of_doubts(scan, target)
+            examples = alignment_examples(loaded, reference_cloud)
+            scan = read_scan(loaded, target, options, examples)
+            warn_of_scan(scan, target)
             target_cloud, doubts = scan.scan, scan.warnings
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")

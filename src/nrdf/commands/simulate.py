@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, errors, progress_bar, show, table, versions
+from nrdf.commands.options import Axis, File, Folder, Metavar
 from nrdf.io.bounds import FINITE, Count, NonNegative, Seed
 
 
 def simulate(
-    job: Positional[Path],
-    out: Path,
-    robot: Path | None = None,
-    tool_frame: str | None = None,
-    base: tuple[str, ...] = ("auto",),
-    stand: NonNegative = 0.0,
+    job: Positional[Folder],
+    out: Folder | None = None,
+    robot: File | None = None,
+    tool_frame: Annotated[str, Metavar("NAME")] | None = None,
+    base: Annotated[tuple[str, ...], Metavar("auto|X Y Z")] = ("auto",),
+    stand: Annotated[NonNegative, Metavar("M")] = 0.0,
     turns: Count | None = None,
-    mesh: Path | None = None,
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None,
-    shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    pictures: bool = True,
+    mesh: File | None = None,
+    up: Axis | None = None,
+    shift_mm: Annotated[tuple[float, float, float], Metavar("X Y Z")] = (0.0, 0.0, 0.0),
+    no_pictures: bool = False,
     seed: Seed = 0,
     overwrite: bool = False,
 ) -> None:
@@ -33,23 +33,24 @@ def simulate(
     turntable before the arm. Writes joint trajectories (CSV, ROS 2 bag, URScript), report.json,
     report.html, pictures and a film.
 
-    Example: nrdf simulate job/ --out sim/
+    Example: nrdf simulate job-new/
 
     Args:
         job: Folder that `nrdf transfer` wrote.
-        out: Folder to write; made if missing.
+        out: Folder to write; JOB/simulation unless given.
         robot: URDF or MJCF file; the bundled arm unless given.
         tool_frame: Body or site of the robot that the tool is mounted on.
-        base: Place of the arm's base, m: x y z from the floor under the middle of the object, x the
-            object's own x, z up; or auto, to search for the one that reaches most.
-        stand: Height of the object above the floor, m, where the base is given.
+        base: Place of the arm's base in metres: x y z from the floor under the middle of the
+            object, x the object's own x, z up; or auto, to search for the one that reaches most.
+        stand: Height of the object above the floor, where the base is given.
         turns: Turns of the turntable to choose from (12); 1 for an object that stays as it is, as
             it does unless given where the base is given.
         mesh: Mesh of the object in metres, in the job's frame, for collisions; the scan unless
             given.
         up: Direction in the job's frame that points up; as the job says unless given.
-        shift_mm: Put the object off its place by x y z, in its own frame, to try the force control.
-        pictures: Draw pictures and a film.
+        shift_mm: Put the object off its place by x y z in millimetres, in its own frame, to try the
+            force control.
+        no_pictures: Leave out the pictures and the film.
         seed: Of the random searches.
         overwrite: Replace an earlier result in the output folder.
     """
@@ -60,6 +61,7 @@ def simulate(
     from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.robot.simulation.simulate import simulate as run
 
+    out = out or (job if job.is_dir() else job.parent) / "simulation"
     with output_folder(out, overwrite, [job, robot, mesh]) as folder:
         work = read_simulation_job(job, up)
         arm = load_arm(robot, tool_frame)
@@ -71,9 +73,10 @@ def simulate(
             shift = tuple(x / 1e3 for x in shift_mm)
             done = run(work, arm, distance_field, given, count, shift, seed, status.update)
         origin = {"command": command_line(), "job": str(job), "versions": versions()}
+        drawn = not no_pictures
         with progress_bar("pictures") as progress:
             report = write_simulation(
-                folder, done, job.resolve().name, origin, pictures, pictures, progress
+                folder, done, job.resolve().name, origin, drawn, drawn, progress
             )
     show_simulation(report)
     console.print(f"all in {out}; {out}/report.html shows it")

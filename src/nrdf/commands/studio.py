@@ -8,18 +8,19 @@ from typing import Annotated
 
 from nrdf.commands.console import command_line, console, errors, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import File, Folder, Metavar
 from nrdf.io.bounds import Bounds
 
 
 @one_run_at("session")
 def studio(
-    session: Path = Path("studio"),
+    session: Folder = Path("studio"),
     host: str = "127.0.0.1",
     port: Annotated[int, Bounds(1, 65535)] = 8080,
     no_browser: bool = False,
     device: str = "cpu",
-    robot: Path | None = None,
-    tool_frame: str | None = None,
+    robot: File | None = None,
+    tool_frame: Annotated[str, Metavar("NAME")] | None = None,
 ) -> None:
     """Paint regions, describe processes and see them on other objects, in a browser.
 
@@ -36,7 +37,7 @@ def studio(
         no_browser: Do not open a browser.
         device: cpu, cuda, cuda:N or auto.
         robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
-        tool_frame: PaintableCloud or site of the robot that the tool is mounted on.
+        tool_frame: Body or site of the robot that the tool is mounted on.
     """
     from nrdf.errors import ModelError, OutputError
 
@@ -49,9 +50,9 @@ def studio(
     import nrdf
     from nrdf.field.zoo import list_models
     from nrdf.studio.app import Studio
-    from nrdf.studio.model.computing import ChildProcessComputing
-    from nrdf.studio.model.session import Session
+    from nrdf.studio.computing import SeparateComputing
     from nrdf.studio.serving import LOOPBACK, open_server
+    from nrdf.studio.session import Session
 
     categories = [entry.category for entry in list_models()]
     if not categories:
@@ -62,7 +63,7 @@ def studio(
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
-        kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
+        kept, server, SeparateComputing(partial(nrdf.load_model, device=device)), categories,
         origin, robot, tool_frame,
     )  # fmt: skip
     if host not in LOOPBACK:

@@ -136,7 +136,7 @@ def load_kind_network(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwo
     if metadata.get("preset") != KIND:
         raise ModelError(
             f"{path} holds weights of preset '{metadata.get('preset')}', not what tells a kind of "
-            "object; `nrdf kind` trains what is needed here"
+            "object; `nrdf model kind` trains what is needed here"
         )
     with torch.random.fork_rng(devices=[]):
         network = KindNetwork(KindConfig(**metadata["field"]))

@@ -125,7 +125,7 @@ def load_yaw_network(name: str | Path, zoo: Path = YAW_ZOO) -> tuple[YawNetwork,
     if metadata.get("preset") != YAW:
         raise ModelError(
             f"{path} holds a field of preset '{metadata.get('preset')}', not yaws; "
-            "`nrdf yaw` trains what is needed here"
+            "`nrdf model yaw` trains what is needed here"
         )
     network = fill(path, YAW, tensors, lambda: YawNetwork(YawConfig(**metadata["field"])))
     return network, metadata

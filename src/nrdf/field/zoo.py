@@ -94,7 +94,7 @@ def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
         if not (path / WEIGHTS).is_file():
             raise ModelError(
                 f"the folder {path} holds no {WEIGHTS}: its training run has not finished (start "
-                "the same `nrdf train` again to go on), or it is no training run"
+                "the same `nrdf model train` again to go on), or it is no training run"
             )
         return path / WEIGHTS
     if path.is_file():

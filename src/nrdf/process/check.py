@@ -143,5 +143,5 @@ def check_category(category: str, model: str | Path | None = None) -> None:
         raise ProcessError(
             f"no model for the category '{category}'{suggest_name(category, known)}. With a model "
             "of your own give --model; if it is meant all the same, set allow_unusual: true at the "
-            "top of the file (nrdf knowledge new --allow-unusual)"
+            "top of the file (nrdf teach --allow-unusual)"
         )

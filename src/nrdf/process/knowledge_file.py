@@ -30,7 +30,7 @@ def read_knowledge(path: str | Path) -> Knowledge:
     """
     path = Path(path)
     if not path.exists():
-        raise ProcessError(f"no knowledge file {path}; `nrdf knowledge new` writes one")
+        raise ProcessError(f"no knowledge file {path}; `nrdf teach` writes one")
     try:
         text = read_file(path, ProcessError, _LARGEST_FILE).decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -18,8 +18,8 @@ EXPLANATION = """\
 # Quantities are SI; millimetres, degrees and rpm are understood as well: stepover_mm: 15 is
 # stepover_m: 0.015, and so are tilt_deg, feed_mm_s and spindle_rpm. Lines that begin with # are not
 # set. Directions and points are in the reference cloud's own frame.
-#   nrdf knowledge check FILE               shows what it says and whether it fits the reference
-#   nrdf transfer FILE --target new.ply --out job/
+#   nrdf check FILE         shows what it says and whether it fits the reference
+#   nrdf transfer FILE new.ply
 """
 _WIDTH = 100
 _RARE = ("origin", "mask", "indices", "points_m", "normals")

@@ -245,7 +245,8 @@ def read_index(folder: str | Path) -> list[IndexRow]:
             rows = [IndexRow(*(line[c] or "" for c in _COLUMNS)) for line in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(
-            f"cannot read {path} ({error}); make a data folder by 'nrdf prepare' or 'nrdf synth'"
+            f"cannot read {path} ({error}); make a data folder by "
+            "'nrdf model prepare' or 'nrdf model synth'"
         ) from error
     wrong = [row for row in rows if row.split not in SPLITS]
     if wrong:

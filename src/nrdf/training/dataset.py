@@ -56,7 +56,9 @@ class ShapeDataset:
             self.sources.append(shape.source)
             self.categories.add(shape.category)
         if not surface:
-            raise DataError("no training shapes; prepare some (`nrdf prepare` or `nrdf synth`)")
+            raise DataError(
+                "no training shapes; prepare some (`nrdf model prepare` or `nrdf model synth`)"
+            )
         self.surface = torch.stack(surface).to(self.device)
         self.surface_normals = torch.stack(normals).to(self.device)
         self.extremes = torch.cat([self.surface.argmin(1), self.surface.argmax(1)], dim=1)

@@ -43,7 +43,7 @@ def ablate(
 
     Args:
         category: What the shapes are; chair, car or plane with --bsrc.
-        data: Data folders (of `nrdf prepare` or `nrdf synth`).
+        data: Data folders (of `nrdf model prepare` or `nrdf model synth`).
         schedule: short (for a CPU) or full (the paper's, for a GPU); what they cost stands in
             docs/evidence/bsrc.md.
         config: A configuration file of your own instead; its last stage is the one that loses

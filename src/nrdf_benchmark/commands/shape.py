@@ -33,7 +33,7 @@ def shape(
     Example: nrdf eval shape --data data/chair --method nrdf ndf imdc --out results/
 
     Args:
-        data: A data folder of one category (of `nrdf prepare --index`, with a test split).
+        data: A data folder of one category (of `nrdf model prepare --index`, with a test split).
         method: Methods to score, rows of the table: nrdf, nrdf-paper, ndf, imdc.
         model: METHOD=PATH of a weight file or run; a zoo name or path alone is for nrdf, which
             otherwise has the category's model in the zoo.

@@ -27,7 +27,7 @@ ORIGIN = "the studio"
 
 
 def new_step(kind: str) -> dict[str, Any]:
-    """A process of a kind with the values that `nrdf knowledge new` gives it."""
+    """A process of a kind with the values that `nrdf teach` gives it."""
     content = {"kind": kind, **DEFAULTS[kind]}  # type: ignore[index]
     return plain_step(Process.model_validate(content))
 

@@ -50,7 +50,7 @@ class SaveTab:
     def _knowledge(self, said: PanelEvent) -> None:
         place = save_knowledge(self.studio.editor)
         said.client.send_file_download("knowledge.zip", zipped(place), save_immediately=True)
-        self._tell(place, f"nrdf knowledge check {next(place.glob('*.yaml'))}")
+        self._tell(place, f"nrdf check {next(place.glob('*.yaml'))}")
 
     def _picture(self, said: PanelEvent) -> None:
         def work(progress: Progress) -> None:

@@ -17,6 +17,7 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
+from nrdf.commands.options import Folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,10 +34,10 @@ SCAN_PIXELS, SCAN_NOISE_M = 260, 0.0005
 
 
 def demo(
-    out: Path = Path("demo"),
+    out: Folder = Path("demo"),
     model: str = "chair",
     device: str = "cpu",
-    arm: bool = True,
+    no_arm: bool = False,
     overwrite: bool = False,
 ) -> None:
     """Bring a bundled chair's five processes to four other chairs.
@@ -54,7 +55,7 @@ def demo(
         out: Folder to write; made if missing.
         model: Zoo name, weight file or run of the category chair.
         device: cpu, cuda, cuda:N or auto.
-        arm: Drive the real chair's job on the bundled arm, in simulation; takes a minute.
+        no_arm: Leave out the real chair's job on the simulated arm, which takes a minute.
         overwrite: Replace an earlier demo in the output folder.
     """
     from nrdf.bundled import REAL, REFERENCE
@@ -62,7 +63,7 @@ def demo(
 
     with output_folder(out, overwrite, [model]) as folder:
         results = _run(folder, model, device)
-        simulated = _simulate(folder) if arm else None
+        simulated = _simulate(folder) if not no_arm else None
     _show(results)
     console.print(
         f"{REAL}: a real chair, scanned in an unknown pose. off mesh: 99 % of what its tool paths "
@@ -78,11 +79,11 @@ def demo(
     console.print(
         f"\npicture and report in {out}; for each chair a job: {first}/report.html shows it.\n"
         f"Next, for instance, change {out}/chair.yaml, then\n"
-        f"nrdf knowledge check {out}/chair.yaml\n"
-        f"nrdf transfer {out}/chair.yaml --target {first}.ply --up z --out job\n"
-        "nrdf export job --format rapid noether\n"
+        f"nrdf check {out}/chair.yaml\n"
+        f"nrdf transfer {out}/chair.yaml {first}.ply --up z\n"
+        f"nrdf export job-{REAL} --format rapid noether\n"
         f"or only find regions: nrdf retrieve --model {model} --reference {out}/{REFERENCE}.ply "
-        f"--region {out}/{REFERENCE}/seat.ply --target {first}.ply --up z --out result"
+        f"--region {out}/{REFERENCE}/seat.ply --target {first}.ply --up z"
     )
 
 

@@ -1,4 +1,4 @@
-"""`nrdf train`: weights of one category from training shapes."""
+"""`nrdf model train`: weights of one category from training shapes."""
 
 from __future__ import annotations
 
@@ -7,28 +7,29 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from nrdf.commands.console import console
+from nrdf.commands.options import File, Folder
 
 
 def train(
     category: Positional[str],
-    data: tuple[Path, ...],
+    data: tuple[Folder, ...],
     preset: str = "default",
-    config: Path | None = None,
+    config: File | None = None,
     device: str = "auto",
-    out: Path | None = None,
+    out: Folder | None = None,
     overwrite: bool = False,
 ) -> None:
     """Train a field; killed at any moment, the same command goes on.
 
     Writes checkpoints, metrics.jsonl, TensorBoard scalars (with nrdf[train]), and at the end
     weights.safetensors, which `--model` of the other verbs takes. On several GPUs:
-    torchrun --nproc-per-node 4 -m nrdf.cli train ...
+    torchrun --nproc-per-node 4 -m nrdf.cli model train ...
 
-    Example: nrdf train chair --data data/chair --preset default --device auto --out runs/chair
+    Example: nrdf model train chair --data data/chair --preset default --device auto
 
     Args:
         category: What the shapes are; all of them must be of it.
-        data: Data folders (of `nrdf prepare` or `nrdf synth`).
+        data: Data folders (of `nrdf model prepare`, `synth` or `boxes`).
         preset: default, chair, car, paper, ndf, imdc, or one of the last three with -short:
             the configuration of that name, whose file says what it costs.
         config: A configuration file of your own, instead of a preset.

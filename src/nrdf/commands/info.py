@@ -1,20 +1,15 @@
-"""`nrdf info` and `nrdf zoo`: what is installed, and the models that ship."""
+"""`nrdf info`: versions, devices and the model zoo."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
-from typing import Any, Literal
-
-from tyro.conf import Positional
+from typing import Any
 
 from nrdf.commands.console import console, show, table, versions
-from nrdf.errors import ConfigError
-from nrdf.io.bounds import FINITE
 
 
 def info(as_json: bool = False) -> None:
-    """Versions, devices, and the zoo's models with their scores.
+    """Show versions, devices, and the models of the zoo with their scores.
 
     Example: nrdf info
 
@@ -33,7 +28,7 @@ def info(as_json: bool = False) -> None:
     for name, value in found["devices"].items():
         shown.add_row(name, value)
     show(shown)
-    shown = table("\nmodels in the zoo", "name", "preset", "MB", "trained on", "commit", "date")
+    shown = table("\nmodel zoo", "name", "preset", "MB", "trained on", "commit", "date")
     for model in found["models"]:
         sources = ", ".join(f"{n} {source}" for source, n in model["sources"].items())
         commit, date = (model["commit"] or "")[:10], (model["date"] or "")[:10]
@@ -42,7 +37,7 @@ def info(as_json: bool = False) -> None:
     if found["models"]:
         show(shown)
     else:
-        console.print("\nno models in the zoo")
+        console.print("\nthe model zoo is empty")
     for model in found["models"]:
         scores = ", ".join(f"{name} {value:.4g}" for name, value in model["scores"].items())
         console.print(f"{model['name']}: {scores or 'no scores'}")
@@ -85,44 +80,3 @@ def gather() -> dict[str, Any]:
         for name, entry in entries
     ]
     return {"versions": versions(), "devices": devices, "models": models}
-
-
-def zoo(
-    action: Positional[Literal["add"]],
-    weights: Positional[Path],
-    name: str | None = None,
-    scores: tuple[str, ...] = (),
-    note: str = "",
-) -> None:
-    """Add a trained field, or what tells yaw or kind, to the zoo of this checkout.
-
-    Files over 8 MB are refused. The index gets the checksum, and from the file preset, training
-    shapes with licences, commit and date.
-
-    Example: nrdf zoo add runs/chair --scores bsrc-dev-cd-l1=0.0312
-
-    Args:
-        action: add.
-        weights: Weight file or finished training run's folder.
-        name: Name in the zoo; the category unless given.
-        scores: name=value, lower is better; added to the scores of the training run.
-        note: One line about this model.
-    """
-    from nrdf.field.zoo import ZOO, add_to_zoo
-    from nrdf.io.locks import write_lock
-
-    with write_lock(ZOO):
-        entry = add_to_zoo(weights, name, _parse_scores(scores), note)
-    console.print(f"'{entry.name}' is in the zoo: {entry.file}, {entry.bytes / 1e6:.2f} MB")
-
-
-def _parse_scores(words: tuple[str, ...]) -> dict[str, float]:
-    scores = {}
-    for word in words:
-        name, _, value = word.partition("=")
-        try:
-            scores[name] = float(value)
-            FINITE.check(f"the score {name}", scores[name])
-        except ValueError:
-            raise ConfigError(f"a score is name=value with a number, not '{word}'") from None
-    return scores

@@ -1,4 +1,4 @@
-"""`nrdf knowledge`, `nrdf transfer` and what follows, as a user types them."""
+"""`nrdf teach`, `nrdf transfer` and what follows, as a user types them."""
 
 from __future__ import annotations
 
@@ -30,19 +30,21 @@ def files(tmp_path):
 
 @pytest.fixture
 def taught(files):
-    words = f"knowledge new --reference {files}/box.ply --category chair --region {files}/top.ply "
+    words = f"teach --reference {files}/box.ply --category chair --region {files}/top.ply "
     words += f"{files}/front.ply --kind sand oil --out {files}/box.yaml"
     assert cli.run(words.split()) == 0
     return files
 
 
-def transfer(files, model, *more, kind="--any-kind"):
-    words = f"transfer {files}/box.yaml --model {model} --target {files}/new.ply --out {files}/job"
+def transfer(files, model, *more, kind="--any-kind", target=None):
+    words = (
+        f"transfer {files}/box.yaml {target or files / 'new.ply'} --model {model} --out {files}/job"
+    )
     return cli.run([*words.split(), *([kind] if kind else []), *more])
 
 
 def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
-    assert cli.run(["knowledge", "check", str(taught / "box.yaml")]) == 0
+    assert cli.run(["check", str(taught / "box.yaml")]) == 0
     said = capsys.readouterr().out
     assert "2 processes on 2 regions: nothing is wrong" in said and "30 mm" in said
     assert transfer(taught, untrained, "--min-coverage", "0.5", "--require-all") == 0
@@ -57,7 +59,7 @@ def test_from_a_reference_to_robot_programs(taught, untrained, capsys):
     assert job.frame == "cell" and [path.process for path in job.paths] == ["sand", "oil"]
     assert max(abs(s.positions).max() for path in job.paths for s in path.segments) < 1.0
     assert cli.run(["export", str(taught / "job"), "--format", "urscript", "csv"]) == 0
-    assert cli.run(["knowledge", "check", str(taught / "job" / "knowledge.yaml")]) == 0
+    assert cli.run(["check", str(taught / "job" / "knowledge.yaml")]) == 0
 
 
 def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, capsys):
@@ -86,9 +88,10 @@ def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, c
 def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
     """In its unit, whatever was sampled of it; the limit is on that distance."""
     box = trimesh.creation.box(1000 * SIZE)
-    box.export(taught / "box.stl")
-    words = ("--target", str(taught / "box.stl"), "--unit", "mm")
-    assert transfer(taught, untrained, *words, "--max-surface-distance-mm", "20") == 0
+    mesh = taught / "box.stl"
+    box.export(mesh)
+    words = ("--unit", "mm")
+    assert transfer(taught, untrained, *words, "--max-surface-distance-mm", "20", target=mesh) == 0
     report = json.loads((taught / "job" / "report.json").read_text())
     for path in report["paths"]:
         assert path["metrics"]["compared_with"] == "the mesh as given (12 triangles)"
@@ -97,7 +100,7 @@ def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
     page = (taught / "job" / "report.html").read_text()
     assert "the mesh as given (12 triangles)" in page and "off the object" in page
     tight = ("--max-surface-distance-mm", "0", "--max-step-mm", "1", "--overwrite")
-    assert transfer(taught, untrained, *words, *tight) == 3
+    assert transfer(taught, untrained, *words, *tight, target=mesh) == 3
     said = " ".join(capsys.readouterr().err.split())
     assert "the worst distance from the mesh as given (12 triangles) is" in said
     assert "the largest step between waypoints is" in said and "above 1 mm" in said
@@ -160,10 +163,10 @@ def test_strict_takes_no_warning_and_the_result_is_written(taught, untrained, ca
 
 
 def test_a_placeholder_says_what_to_do(files, capsys):
-    words = f"knowledge new --reference {files}/box.ply --category chair --out {files}/box.yaml"
+    words = f"teach --reference {files}/box.ply --category chair --out {files}/box.yaml"
     assert cli.run(words.split()) == 0
     assert "my-region.ply" in capsys.readouterr().out
-    assert cli.run(["knowledge", "check", str(files / "box.yaml")]) == 2
+    assert cli.run(["check", str(files / "box.yaml")]) == 2
     assert "region 'my-region': cannot read" in capsys.readouterr().err
     assert cli.run(words.split()) == 2
     assert "exists; give another name, or --overwrite" in capsys.readouterr().err
@@ -173,7 +176,7 @@ def test_a_placeholder_says_what_to_do(files, capsys):
 def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
     path = taught / "box.yaml"
     path.write_text(path.read_text().replace("edge_margin_m: 0.01", "edge_margin_m: 0.4", 1))
-    assert cli.run(["knowledge", "check", str(path)]) == 2
+    assert cli.run(["check", str(path)]) == 2
     said = capsys.readouterr()
     assert "region 'top', sand: edge_margin_m is 0.4, which leaves nothing" in said.err
     assert "asked for" in said.out and "nothing is wrong" not in said.out
@@ -182,37 +185,37 @@ def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
 def test_check_finds_a_category_that_no_model_is_for(taught, untrained, capsys):
     path = taught / "box.yaml"
     path.write_text(path.read_text().replace("category: chair", "category: chiar", 1))
-    assert cli.run(["knowledge", "check", str(path)]) == 2
+    assert cli.run(["check", str(path)]) == 2
     assert "category: no model for the category 'chiar'; did you mean" in capsys.readouterr().err
-    assert cli.run(["knowledge", "check", str(path), "--model", str(untrained)]) == 2
+    assert cli.run(["check", str(path), "--model", str(untrained)]) == 2
     assert "is for chair" in capsys.readouterr().err
     text = path.read_text()
     path.write_text(text.replace("allow_unusual: false", "allow_unusual: true", 1))
     assert path.read_text() != text
-    assert cli.run(["knowledge", "check", str(path)]) == 0
+    assert cli.run(["check", str(path)]) == 0
 
 
 def test_new_takes_an_unusual_category_where_it_is_meant(files, capsys):
-    words = f"knowledge new --reference {files}/box.ply --category sofa --out {files}/sofa.yaml"
+    words = f"teach --reference {files}/box.ply --category sofa --out {files}/sofa.yaml"
     words += f" --region {files}/top.ply"
     assert cli.run(words.split()) == 2
     assert "--model" in capsys.readouterr().err and not (files / "sofa.yaml").exists()
     assert cli.run([*words.split(), "--allow-unusual"]) == 0
-    assert cli.run(["knowledge", "check", str(files / "sofa.yaml")]) == 0
+    assert cli.run(["check", str(files / "sofa.yaml")]) == 0
 
 
 def test_json_and_its_schema(taught, tmp_path, capsys):
-    words = f"knowledge new --reference {taught}/box.ply --category chair --out {taught}/box.json"
+    words = f"teach --reference {taught}/box.ply --category chair --out {taught}/box.json"
     assert cli.run([*words.split(), "--region", str(taught / "top.ply")]) == 0
     assert json.loads((taught / "box.json").read_text())["version"] == 1
     assert read_knowledge(taught / "box.json").regions[0].name == "top"
     capsys.readouterr()
-    assert cli.run(["knowledge", "schema"]) == 0
+    assert cli.run(["teach", "--schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
     feed = schema["$defs"]["Process"]["properties"]["feed_m_s"]["description"]
     assert feed.endswith("Plausible: 0.0001 to 5.")
     assert schema["properties"]["regions"] and "2020-12" in schema["$schema"]
-    assert cli.run(["knowledge", "schema", "--out", str(tmp_path / "s.json")]) == 0
+    assert cli.run(["teach", "--schema", "--out", str(tmp_path / "s.json")]) == 0
     assert json.loads((tmp_path / "s.json").read_text()) == schema
 
 

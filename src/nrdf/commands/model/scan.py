@@ -1,31 +1,32 @@
-"""`nrdf scan`: depth cameras simulated around a mesh, with the truth beside what they saw."""
+"""`nrdf model scan`: depth cameras simulated around a mesh, with the truth beside what they saw."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console
+from nrdf.commands.options import Axis, File, Metavar, Unit
 from nrdf.io.bounds import Bounds, NonNegative, Positive, Seed
 
 
 def scan(
-    mesh: Positional[Path],
-    out: Path,
+    mesh: Positional[File],
+    out: File | None = None,
     views: Annotated[int, Bounds(1, 1000)] = 3,
     noise: NonNegative = 0.0,
     quantisation: NonNegative = 0.0,
-    grazing: Annotated[float, Bounds(0.0, 90.0)] = 15.0,
+    grazing: Annotated[float, Bounds(0.0, 90.0), Metavar("DEG")] = 15.0,
     distance: Positive = 2.0,
     pixels: Annotated[int, Bounds(1, 4096)] = 240,
     floor: bool = False,
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z",
-    yaw: float | None = None,
+    up: Axis = "z",
+    yaw: Annotated[float, Metavar("DEG")] | None = None,
     scale: Positive = 1.0,
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    unit: Literal["m", "cm", "mm", "in"] | None = None,
+    offset: Annotated[tuple[float, float, float], Metavar("X Y Z")] = (0.0, 0.0, 0.0),
+    unit: Unit | None = None,
     normals: bool = False,
     seed: Seed = 0,
 ) -> None:
@@ -34,11 +35,11 @@ def scan(
     Writes the points as PLY, with the cameras' places as comments, and what is true of them (pose,
     scale, cameras) as JSON beside it, under the same name.
 
-    Example: nrdf scan chair.ply --views 3 --noise 0.001 --floor --out scan.ply
+    Example: nrdf model scan chair.ply --views 3 --noise 0.001 --floor --out scan.ply
 
     Args:
         mesh: Mesh of the object: +X forward, +Y up.
-        out: PLY file to write.
+        out: PLY file to write; scan-NAME.ply unless given.
         views: Cameras, spread around the object.
         noise: Standard deviation of depth at the object's middle, in the mesh's unit; it grows with
             depth squared.
@@ -67,6 +68,7 @@ def scan(
     from nrdf.io.output import output_files
     from nrdf.scans.simulate import ScanSettings, simulate_scan
 
+    out = out or Path(f"scan-{mesh.stem}.ply")
     beside = out.with_suffix(".json")
     if out.suffix.lower() != ".ply":
         raise DataError(f"--out {out} must end in .ply")

@@ -1,0 +1,25 @@
+"""What a maker of models needs, one verb per module.
+
+In: meshes, boxes or nothing. Out: training shapes, their correspondences, weights, the model zoo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+
+def model() -> dict[str, Callable[..., Any]]:
+    """Make training shapes, train a model of a category, add it to the model zoo."""
+    from nrdf.commands.model.add import add
+    from nrdf.commands.model.boxes import boxes
+    from nrdf.commands.model.correspond import correspond
+    from nrdf.commands.model.kind import kind
+    from nrdf.commands.model.prepare import prepare
+    from nrdf.commands.model.scan import scan
+    from nrdf.commands.model.synth import synth
+    from nrdf.commands.model.train import train
+    from nrdf.commands.model.yaw import yaw
+
+    every = (synth, boxes, prepare, correspond, scan, train, yaw, kind, add)
+    return {verb.__name__: verb for verb in every}
