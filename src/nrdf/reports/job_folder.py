@@ -22,15 +22,15 @@ from nrdf.process.limits import Limits
 from nrdf.process.taught_paths import contact_points
 from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
-from nrdf.reports.page import write_page
+from nrdf.reports.html import write_transfer_html
 from nrdf.reports.transfer_report import report_of
 from nrdf.toolpath.file import write_toolpaths
 from nrdf.toolpath.types import Job
 from nrdf.viz.picture import Panel, draw_regions, render_details
 
 KNOWLEDGE, TARGET, REGIONS = "knowledge.yaml", "target.ply", "regions"
-PAGE, PICTURE = "report.html", "picture.png"
-_WHOLE, _DETAIL = 540, 280  # pixels of a view; the page shows details smaller
+HTML_REPORT, PICTURE = "report.html", "picture.png"
+_WHOLE, _DETAIL = 540, 280  # pixels of a view; the HTML report shows details smaller
 
 
 def write_job(
@@ -78,7 +78,7 @@ def write_job_files(
     report = {"title": title, **report_of(result, limits), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    write_page(folder / PAGE, report, folder / PICTURE, details)
+    write_transfer_html(folder / HTML_REPORT, report, folder / PICTURE, details)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     report["files"] = [*files, REPORT]
     write_json(folder / REPORT, report)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nrdf.export.registry import FORMATS
-from nrdf.reports.job_folder import PAGE
+from nrdf.reports.job_folder import HTML_REPORT
 from nrdf.studio.model.result_cache import TargetResult
 from nrdf.studio.model.saving import save_job, save_knowledge, save_picture, save_programs, zipped
 
@@ -69,11 +69,13 @@ class SaveTab:
             progress(0, 1)
             place = save_job(self.studio.editor, name, result, self.studio.origin)
             if page:
-                content, file = (place / PAGE).read_bytes(), f"{name}.html"
+                content, file = (place / HTML_REPORT).read_bytes(), f"{name}.html"
             else:
                 content, file = zipped(place), f"{name}-job.zip"
             said.client.send_file_download(file, content, save_immediately=True)
-            self._tell(place / PAGE if page else place, f"nrdf export {place} --format urscript")
+            self._tell(
+                place / HTML_REPORT if page else place, f"nrdf export {place} --format urscript"
+            )
 
         self.studio.worker.submit("save", "writing the job and its pictures", work)
 
