@@ -11,7 +11,7 @@ from builders.taught_box import SIZE, cloud, faces
 from nrdf.process.correspondence import Correspondence, ReferenceSurface
 from nrdf.process.taught_paths import surface_under
 from nrdf.process.warp import warp_segments
-from nrdf.regions.match import MappedPoints
+from nrdf.regions.mapping import MappedPoints
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions
 from nrdf.toolpath.types import Segment

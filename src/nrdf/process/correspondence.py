@@ -14,7 +14,7 @@ from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
 from nrdf.io.cloud import PointCloud
-from nrdf.regions.match import MappedPoints
+from nrdf.regions.mapping import MappedPoints
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.surface.surface import SAME_SIDE, Surface

@@ -1,4 +1,4 @@
-"""A reference whose descriptors are known: its regions are found on every new object."""
+"""A reference with its descriptors: its regions are found on every new object."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import torch
 
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
 from nrdf.io.inputs import as_cloud
 from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
-from nrdf.regions.match import TRUST_SCALE, MappedPoints, Match, mapped_points
+from nrdf.regions.mapping import TRUST_SCALE, MappedPoints, describe, invert
+from nrdf.regions.match import Match
 from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
@@ -28,21 +28,23 @@ from nrdf.scans.pose_scorer import PoseScorer
 log = logging.getLogger(__name__)
 
 METHODS = ("mask", "points")
-_CHUNK = 8192  # points described or inverted at a time
-_RETURNED = 2048  # of a target's points that are led back to the reference
+_MAPPED_BACK = 2048  # of a target's points
 
 
 class EncodedReference:
-    """A reference whose descriptors are known (paper, eq. 8)."""
+    """A reference, encoded, with its descriptors (paper, eq. 8), for any number of targets.
+
+    model: what encodes targets. reference: (n,) working points, canonical, with their embedding.
+    """
 
     def __init__(self, model: CloudEncoder, reference: EncodedCloud) -> None:
         self.model = model
         self.reference = reference
-        self._k = self._describe(reference.points, reference.normals)
+        self._k = describe(model, reference.z, reference.points, reference.normals)
 
     def check_kind(self, target: EncodedCloud) -> KindCheck:
         """Whether a target looks like an object of the category, upright and facing forward in the
-        pose that it is encoded in; without a network that tells, like the reference."""
+        pose that it is encoded in. A category without a network compares it with the reference."""
         return check_kind(self.model, target, lambda: self._scorer)
 
     @cached_property
@@ -77,11 +79,11 @@ class EncodedReference:
         regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
         target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or encoded.
         Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
-        method: "mask" maps the whole reference and lets each target point ask the mapped
-        reference points nearest in position and normal; parts of the target that are far from all
-        of them, by the error that the field expects, join a region only where they grow out of it
-        (`nrdf.regions.patches`). "points" snaps C's prediction of each
-        region point to the target (paper, eq. 9). A region of fewer than half of
+        method: "mask" maps the whole reference; each target point joins a region by the votes of
+        the mapped reference points nearest in position and normal (k-nearest voting). Parts of the
+        target that are far from all of them, by the error that the field expects, join a region
+        only where they grow out of it (`nrdf.regions.patches`). "points" snaps C's prediction of
+        each region point to the target (paper, eq. 9). A region of fewer than half of
         `VOTING_NEIGHBOURS` points gets no majority anywhere: use "points" for spots.
         refine: move the mapped reference onto the target in a few steps of smooth registration
         (`nrdf.regions.refine`), about half a second a target.
@@ -113,12 +115,14 @@ class EncodedReference:
                 name: self._by_points(self.map_points(indices, encoded, surface), encoded)
                 for name, indices in chosen.items()
             }
-        # Refinement pulls what has no counterpart onto the target too: judge where C has put it.
-        off = encoded.distance(surface.points - surface.moved, surface.normals)
-        asked = self._map_back(encoded)
+        # Refinement pulls what has no counterpart onto the target too: measure from where C put it.
+        distance = encoded.distance(surface.points - surface.displacement, surface.normals)
+        some = np.random.default_rng(0).permutation(len(encoded.points))[:_MAPPED_BACK]
+        back = self._map_back(encoded, some)
+        nearest = self.reference.nearest(back.points, back.normals, VOTING_NEIGHBOURS)
         matches = {
             name: self._with_presence(
-                match, chosen[name], encoded, surface, off, asked, drop_absent
+                match, chosen[name], encoded, surface, distance, (some, nearest), drop_absent
             )
             for name, match in matches.items()
         }
@@ -131,14 +135,14 @@ class EncodedReference:
     def map_surface(self, target: EncodedCloud, refine: bool = False) -> MappedPoints:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
         start = time.perf_counter()
-        mapped = self._invert(target, self._k, self.reference.normals)
+        mapped = invert(self.model, target.z, self._k, self.reference.normals)
         target.seconds["map"] = time.perf_counter() - start
         if refine:
             start = time.perf_counter()
-            moved = self._refiner.displacement(
+            displacement = self._refiner.displacement(
                 mapped.points, mapped.normals, target.points, target.normals
             )
-            mapped = mapped.shifted(moved)
+            mapped = mapped.displaced(displacement)
             target.seconds["refine"] = time.perf_counter() - start
         return mapped
 
@@ -153,65 +157,68 @@ class EncodedReference:
         if reference.is_whole:
             if surface is not None:
                 return surface.select(indices)
-            return self._invert(target, self._k[:, indices], reference.normals[indices])
+            k = self._k[:, indices]
+            return invert(self.model, target.z, k, reference.normals[indices])
         nearest = reference.nearest_working[indices]
         points = reference.canonical(reference.cloud.points[indices])
         normals = reference.normals[nearest]
         if reference.cloud.normals is not None:
             normals = reference.canonical_normals(reference.cloud.normals[indices])
-        mapped = self._invert(target, self._describe(points, normals), normals)
-        return mapped if surface is None else mapped.shifted(surface.moved[nearest])
+        mapped = self._map(points, normals, target)
+        return mapped if surface is None else mapped.displaced(surface.displacement[nearest])
 
     def map_surface_points(
         self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud
     ) -> MappedPoints:
-        """Where any places of the reference's surface arrive on a target.
+        """Where any points of the reference's surface arrive on a target.
 
         points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
         """
         points = self.reference.canonical(points)
         normals = self.reference.canonical_normals(normals)
-        return self._invert(target, self._describe(points, normals), normals)
+        return self._map(points, normals, target)
+
+    def _map(self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud) -> MappedPoints:
+        """Canonical points and normals (m, 3) of the reference on a target."""
+        k = describe(self.model, self.reference.z, points, normals)
+        return invert(self.model, target.z, k, normals)
+
+    def _map_back(self, target: EncodedCloud, chosen: np.ndarray | slice) -> MappedPoints:
+        """Working points of a target on the reference: C(z_reference, θ(z_target, x))."""
+        points, normals = target.points[chosen], target.normals[chosen]
+        k = describe(self.model, target.z, points, normals)
+        return invert(self.model, self.reference.z, k, normals)
 
     def correspondence_features(self, target: EncodedCloud) -> np.ndarray:
-        """What the descriptors of a target's, or the reference's, working points (n, 6) say: what
-        is alike is near.
+        """Features (n, 6) of a target's, or the reference's, working points by which points of
+        different objects are compared: corresponding points have nearly the same.
 
-        Descriptors of two shapes are compared by the places on the reference that C finds for
-        them, C(z_reference, θ(z_target, x)), with their weighted normals. Raises ModelError for a
-        field without C.
+        They are the points of the reference that C finds for the descriptors, with weighted
+        normals. Raises ModelError for a field without C.
         """
-        k = self._describe(target.points, target.normals, target.z)
-        landed = self._invert(self.reference, k, target.normals)
-        return oriented_features(landed.points, landed.normals, NORMAL_WEIGHT)
+        mapped = self._map_back(target, slice(None))
+        return oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
 
     def orient_sheets(
         self, regions: Mapping[str, np.ndarray], target: EncodedCloud
     ) -> EncodedCloud:
-        """The target with its sheets turned to the side that the regions are on.
+        """The target with the normals of its sheets on the side that the regions are on.
 
-        regions: name to mask (n,) or indices (m,) on the reference. Only points whose side nothing
-        tells are turned (`EncodedCloud.two_sided`): a seat that was measured as one sheet becomes
-        the top of a seat where that is taught, and its underside where that is.
+        regions: name to mask (n,) or indices (m,) on the reference. Only points whose side is not
+        known change (`EncodedCloud.two_sided`): a seat that was measured as one sheet becomes the
+        top of a seat where a region holds that, and its underside where a region holds that.
         """
         both, count = target.two_sided(), len(target.working)
         if len(both.working) == count:
             return target
         mapped = self.map_surface(target)
-        asked, _ = nearest_voters(
-            mapped.points,
-            mapped.normals,
-            both.points,
-            both.normals,
-            NORMAL_WEIGHT,
-            VOTING_NEIGHBOURS,
-        )
+        voters, _ = nearest_voters(mapped.points, mapped.normals, both.points, both.normals)
         wanted = np.any([self._working_mask(indices) for indices in regions.values()], axis=0)
-        claim = wanted[asked].mean(axis=1)
-        again = np.flatnonzero(np.isin(target.working, both.working[count:]))
-        turned = again[claim[count:] > claim[again]]
+        votes = wanted[voters].mean(axis=1)
+        sheets = np.flatnonzero(np.isin(target.working, both.working[count:]))
+        flipped = sheets[votes[count:] > votes[sheets]]
         normals = target.normals.copy()
-        normals[turned] *= -1
+        normals[flipped] *= -1
         return replace(target, normals=normals)
 
     def _with_presence(
@@ -220,63 +227,54 @@ class EncodedReference:
         indices: np.ndarray,
         target: EncodedCloud,
         surface: MappedPoints,
-        off: np.ndarray,
-        returned: tuple[np.ndarray, np.ndarray],
+        distance: np.ndarray,
+        mapped_back: tuple[np.ndarray, np.ndarray],
         drop_absent: bool,
     ) -> Match:
-        """The match with the overlap that is to be expected; without its points where the target
-        lacks the region or does not show it. off: (n,) distances of the mapped surface from the
-        target; returned: as `_returned` gives it."""
+        """The match with its expected overlap; without its points where the target lacks the region
+        or does not show it.
+
+        distance: (n,) of the mapped surface from the target. mapped_back: some of the target's
+        working points (m,), and the reference's working points (m, k) nearest to where they map.
+        """
         inside = self._working_mask(indices)
         found = np.zeros(len(target.cloud.points), bool)
         found[match.indices] = True
         found = found[target.working]
-        chosen, asked = returned
-        back = inside[asked[found[chosen]]]
+        chosen, nearest = mapped_back
+        returned = inside[nearest[found[chosen]]]
         evidence = evidence_of(
             surface.existence[inside],
             match.score,
             float(found.mean() / inside.mean()),
-            float(back.mean()) if back.size else 0.0,
+            float(returned.mean()) if returned.size else 0.0,
         )
-        return match.with_presence(find_presence(evidence, off[inside], off), drop_absent)
-
-    def _map_back(self, target: EncodedCloud) -> tuple[np.ndarray, np.ndarray]:
-        """Where a target's points lead back to: positions (m,) of some of its working points, and
-        the reference's working points (m, k) nearest to C(z_reference, θ(z_target, x))."""
-        chosen = np.random.default_rng(0).permutation(len(target.points))[:_RETURNED]
-        points, normals = target.points[chosen], target.normals[chosen]
-        k = self._describe(points, normals, target.z)
-        landed = self._invert(self.reference, k, normals)
-        return chosen, self.reference.nearest(landed.points, landed.normals, VOTING_NEIGHBOURS)
+        presence = find_presence(evidence, distance[inside], distance)
+        return match.with_presence(presence, drop_absent)
 
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: EncodedCloud, mapped: MappedPoints
     ) -> dict[str, Match]:
-        asked, distance = nearest_voters(
-            mapped.points,
-            mapped.normals,
-            target.points,
-            target.normals,
-            NORMAL_WEIGHT,
-            VOTING_NEIGHBOURS,
+        """Each target point joins a region by the votes of its nearest mapped reference points."""
+        voters, distance = nearest_voters(
+            mapped.points, mapped.normals, target.points, target.normals
         )
-        trust = mapped.trust[asked] * np.exp(-distance / TRUST_SCALE)
-        patches = find_patches(target.points, explained_by(distance, mapped.error[asked]))
+        trust = mapped.trust[voters] * np.exp(-distance / TRUST_SCALE)
+        patches = find_patches(target.points, explained_by(distance, mapped.error[voters]))
         matches = {}
         for name, indices in chosen.items():
-            member = self._working_mask(indices)[asked]
+            member = self._working_mask(indices)[voters]
             votes = member.mean(axis=1)
             confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
             voted = votes > 0.5
             found = patches.joined(voted)
-            # Where much was voted in that nothing on the reference explains, the rest is doubtful.
+            # Where much was voted in that nothing on the reference explains, trust the rest less.
             confidence *= found.sum() / max(voted.sum(), 1)
             index, follows = target.to_all(found)
-            arrived = self.map_points(indices, target, mapped)
+            points = self.map_points(indices, target, mapped).points
             matches[name] = Match(
                 indices=index,
-                points=target.original(arrived.points),
+                points=target.original(points),
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
             )
@@ -304,29 +302,3 @@ class EncodedReference:
         # The region fell between the points that were kept: its nearest ones stand for it.
         mask[reference.nearest_working[indices]] = True
         return mask
-
-    def _describe(
-        self, points: np.ndarray, normals: np.ndarray, z: torch.Tensor | None = None
-    ) -> torch.Tensor:
-        """Descriptors (1, m, d_k) of points (m, 3), on the reference or on the shape of z."""
-        model, z = self.model, self.reference.z if z is None else z
-        parts = []
-        with torch.inference_mode():
-            for start in range(0, len(points), _CHUNK):
-                part = slice(start, start + _CHUNK)
-                parts.append(
-                    model.field.describe(
-                        z,
-                        model.tensor(points[part])[None],
-                        model.tensor(normals[part])[None],
-                    )
-                )
-        return torch.cat(parts, dim=1)
-
-    def _invert(self, target: EncodedCloud, k: torch.Tensor, normals: np.ndarray) -> MappedPoints:
-        parts = []
-        with torch.inference_mode():
-            for start in range(0, k.shape[1], _CHUNK):
-                inverse = self.model.field.invert(target.z, k[:, start : start + _CHUNK])
-                parts.append(mapped_points(inverse, normals[start : start + _CHUNK]))
-        return MappedPoints(*map(np.concatenate, zip(*parts, strict=True)))

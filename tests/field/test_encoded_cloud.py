@@ -1,0 +1,53 @@
+"""A cloud as a field sees it: frames, index spaces, sheets of unknown side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset, oriented_features
+from nrdf.geometry.similarity import Similarity, about_up
+from nrdf.io.cloud import PointCloud
+
+
+@pytest.fixture
+def encoded() -> EncodedCloud:
+    """Twelve points in a row, every second one in use."""
+    pose = Similarity(about_up(0.5), np.array([3.0, -1.0, 2.0]), 4.0)
+    canonical = np.stack([np.linspace(-0.5, 0.5, 12), np.zeros(12), np.zeros(12)], 1)
+    cloud = PointCloud(pose.to_scan(canonical))
+    working = np.arange(0, 12, 2)
+    normals = np.tile([0.0, 1.0, 0.0], (6, 1))
+    return EncodedCloud(cloud, working, canonical[::2], normals, pose, torch.zeros(1, 3))
+
+
+def test_frames_undo_each_other(encoded):
+    there = encoded.original(encoded.points)
+    np.testing.assert_allclose(there, encoded.cloud.points[::2], atol=1e-12)
+    np.testing.assert_allclose(encoded.canonical(there), encoded.points, atol=1e-12)
+    normals = encoded.original_normals(encoded.normals)
+    np.testing.assert_allclose(encoded.canonical_normals(normals), encoded.normals, atol=1e-12)
+
+
+def test_points_that_are_not_in_use_follow_their_nearest(encoded):
+    selected = np.zeros(6, bool)
+    selected[[0, 5]] = True
+    index, follows = encoded.to_all(selected)
+    assert {0, 10, 11} <= set(index.tolist()) <= {0, 1, 9, 10, 11}
+    assert follows[index == 0].tolist() == [0] and follows[index == 11].tolist() == [5]
+
+
+def test_distance_counts_position_and_normal(encoded):
+    up, down = encoded.normals[:1], -encoded.normals[:1]
+    assert encoded.distance(encoded.points[:1], up)[0] == pytest.approx(0.0)
+    assert encoded.distance(encoded.points[:1], down)[0] == pytest.approx(0.2)
+    assert encoded.nearest(encoded.points[2:3], up, 3)[0, 0] == 2
+    assert oriented_features(encoded.points, encoded.normals, 0.0).shape == (6, 3)
+
+
+def test_the_encoder_sees_the_extreme_points():
+    points = np.random.default_rng(0).normal(size=(2000, 3))
+    chosen = encoder_subset(points, 100)
+    assert 100 <= len(chosen) <= 106 and len(np.unique(chosen)) == len(chosen)
+    np.testing.assert_array_equal(np.ptp(points[chosen], axis=0), np.ptp(points, axis=0))
