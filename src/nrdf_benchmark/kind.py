@@ -28,8 +28,8 @@ from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.prepare import find_meshes
 from nrdf.training.kind_network import is_held_out
 from nrdf_benchmark import scans
-from nrdf_benchmark.bsrc import read_bsrc
-from nrdf_benchmark.objects import read_objects
+from nrdf_benchmark.bsrc.dataset import read_bsrc
+from nrdf_benchmark.objects.dataset import read_objects
 
 log = logging.getLogger(__name__)
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
-from nrdf_benchmark.bsrc import OPPOSITE_SIDES, ROIS, BenchmarkObject
+from nrdf_benchmark.bsrc.dataset import OPPOSITE_SIDES, ROIS, BenchmarkObject
 
 VERSION = 1
 """Raised when a metric's value changes: figures of different versions are not mixed."""

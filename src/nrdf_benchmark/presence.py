@@ -23,8 +23,8 @@ from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf.regions.presence import SURELY_ABSENT, Evidence
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.families import get_family
-from nrdf_benchmark.objects_match import WHOLE, Finder
-from nrdf_benchmark.objects_pairs import ABSENT, THERE, part_iou, state_of
+from nrdf_benchmark.objects.pairs import ABSENT, THERE, part_iou, state_of
+from nrdf_benchmark.objects.retrieval import WHOLE, Finder
 from nrdf_benchmark.scans import score_regions
 
 FIRST_SEED = 1_000_000

@@ -25,7 +25,7 @@ from nrdf.io.file_names import spreadsheet_text
 from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
 from nrdf.shapes.pool import CRASHED, each
-from nrdf_benchmark.methods import METHODS, MethodSpec
+from nrdf_benchmark.methods.registry import METHODS, MethodSpec
 from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 
 EDGE = 0.55

@@ -26,8 +26,8 @@ from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
 from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
-from nrdf_benchmark.bsrc import read_bsrc
-from nrdf_benchmark.family import CLOUD_POINTS, FIRST_SEED
+from nrdf_benchmark.bsrc.dataset import read_bsrc
+from nrdf_benchmark.families import CLOUD_POINTS, FIRST_SEED
 
 SIZE_M = 0.9
 STRATEGY = Strategy(stepover_m=0.025, spacing_m=0.01, tool_radius_m=0.025)

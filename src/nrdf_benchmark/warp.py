@@ -24,7 +24,7 @@ from nrdf.process.warp import warp_segments
 from nrdf.regions.model import Model
 from nrdf.shapes.families import Family, SurfaceSample, get_family
 from nrdf.shapes.families.member import Member
-from nrdf_benchmark.family import CLOUD_POINTS, FIRST_SEED
+from nrdf_benchmark.families import CLOUD_POINTS, FIRST_SEED
 
 SMALLEST_REGION = 60
 """Points of the reference's cloud that a region needs to be taught."""

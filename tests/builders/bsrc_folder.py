@@ -8,7 +8,7 @@ import numpy as np
 
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.shapes.families import SurfaceCoordinates, get_family
-from nrdf_benchmark.bsrc import FOLDERS, ROIS
+from nrdf_benchmark.bsrc.dataset import FOLDERS, ROIS
 
 DEV_HALF = Path(__file__).parents[3] / "shared" / "bsrc"
 NO_DEV_HALF = (

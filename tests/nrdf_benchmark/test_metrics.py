@@ -7,7 +7,7 @@ import pytest
 
 from nrdf.io.cloud import PointCloud
 from nrdf_benchmark import metrics
-from nrdf_benchmark.bsrc import OPPOSITE_SIDES, ROIS, BenchmarkObject
+from nrdf_benchmark.bsrc.dataset import OPPOSITE_SIDES, ROIS, BenchmarkObject
 from nrdf_benchmark.metrics import (
     METRICS,
     chamfer_l1,

@@ -16,7 +16,7 @@ from nrdf.errors import ConfigError, DataError, OutputError
 from nrdf.field.base import Field, FieldConfig
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.model import Model
-from nrdf_benchmark.methods import MethodSpec
+from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.metrics import MISSED
 from nrdf_benchmark.shape import (
     Settings,

@@ -64,9 +64,10 @@ def ablate(
     from nrdf.training.config import load_config
     from nrdf.training.dataset import load_dataset
     from nrdf.training.provenance import git_commit, list_shapes
-    from nrdf_benchmark import ablation, ablation_table
-    from nrdf_benchmark.bsrc import read_bsrc
-    from nrdf_benchmark.learned import FieldMatch
+    from nrdf_benchmark.ablation import table as ablation_table
+    from nrdf_benchmark.ablation import training as ablation
+    from nrdf_benchmark.bsrc.dataset import read_bsrc
+    from nrdf_benchmark.methods.learned import FieldMatch
 
     out = out or Path("runs") / f"ablate-{category}"
     settings = load_config(config or ablation.SCHEDULES[schedule])

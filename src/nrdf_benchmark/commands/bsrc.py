@@ -19,8 +19,8 @@ from nrdf.commands.one_run import one_run_at
 from nrdf.io.bounds import Count
 
 if TYPE_CHECKING:
-    from nrdf_benchmark.bsrc import Benchmark
-    from nrdf_benchmark.evaluate import MethodResult
+    from nrdf_benchmark.bsrc.dataset import Benchmark
+    from nrdf_benchmark.bsrc.evaluate import MethodResult
 
 
 @one_run_at("out")
@@ -67,12 +67,12 @@ def bsrc(
         overwrite: Start anew, whatever is in the folder.
     """
     from nrdf.errors import ConfigError, unknown_name
-    from nrdf_benchmark.bsrc import read_bsrc
-    from nrdf_benchmark.evaluate import evaluate
-    from nrdf_benchmark.methods import METHODS, build_method, find_methods
+    from nrdf_benchmark.bsrc.dataset import read_bsrc
+    from nrdf_benchmark.bsrc.evaluate import evaluate
+    from nrdf_benchmark.bsrc.table import write_results
+    from nrdf_benchmark.methods.registry import METHODS, build_method, find_methods
     from nrdf_benchmark.metrics import METRICS
-    from nrdf_benchmark.store import PairStore
-    from nrdf_benchmark.table import write_results
+    from nrdf_benchmark.result_cache import PairCache
 
     if metric not in METRICS:
         raise ConfigError(unknown_name("metric", metric, list(METRICS)))
@@ -80,14 +80,14 @@ def bsrc(
     with errors.status("reading the benchmark"):
         benchmark = read_bsrc(data, category, labels)
     workers = workers or os.cpu_count() or 1
-    store = None if out is None else PairStore(out, overwrite)
+    store = None if out is None else PairCache(out, overwrite)
     with progress_bars(method) as progress:
         results = evaluate(benchmark, specs, workers, store, progress)
     _show_table(results, benchmark, metric)
     if out is None:
         return
     from nrdf.training.provenance import git_commit
-    from nrdf_benchmark.figure import draw_comparison
+    from nrdf_benchmark.bsrc.picture import draw_comparison
 
     origin = {
         "versions": versions(),
@@ -107,7 +107,7 @@ def bsrc(
 
 
 def _show_table(results: list[MethodResult], benchmark: Benchmark, metric: str) -> None:
-    from nrdf_benchmark.table import caption, cells, confidence_lines, headings, rows
+    from nrdf_benchmark.bsrc.table import caption, cells, confidence_lines, headings, rows
 
     title, formula = caption(benchmark, metric)
     shown = table(title, "", *headings(benchmark))

@@ -30,7 +30,7 @@ def families(
     import numpy as np
 
     import nrdf
-    from nrdf_benchmark.family import evaluate_family
+    from nrdf_benchmark.families import evaluate_family
 
     loaded = nrdf.load_model(model or category, device)
     with progress_bar(f"pairs of {category}s") as progress:

@@ -67,14 +67,14 @@ def objects(
     from nrdf.errors import DataError
     from nrdf.field.weights import read_metadata
     from nrdf.field.zoo import find_weights
-    from nrdf_benchmark.methods import METHODS, find_methods
-    from nrdf_benchmark.objects import read_objects
-    from nrdf_benchmark.objects_match import Settings, check_choice, finder
-    from nrdf_benchmark.objects_pairs import draw_pairs, group_categories
-    from nrdf_benchmark.objects_report import Report
-    from nrdf_benchmark.objects_run import JOBS, evaluate_jobs, evaluate_objects, pairs_of
-    from nrdf_benchmark.objects_table import cells, headings, rows_of, tables
-    from nrdf_benchmark.store import LineStore
+    from nrdf_benchmark.methods.registry import METHODS, find_methods
+    from nrdf_benchmark.objects.dataset import read_objects
+    from nrdf_benchmark.objects.evaluate import JOBS, evaluate_jobs, evaluate_objects, pairs_of
+    from nrdf_benchmark.objects.pairs import draw_pairs, group_categories
+    from nrdf_benchmark.objects.report import Report
+    from nrdf_benchmark.objects.retrieval import Settings, check_choice, finder
+    from nrdf_benchmark.objects.table import cells, headings, rows_of, tables
+    from nrdf_benchmark.result_cache import LineCache
 
     path = find_weights(model)
     check_choice(method, views)
@@ -90,7 +90,7 @@ def objects(
     if not all_pairs:
         raise DataError(f"{data}: no two objects of a category; nothing can be compared")
     settings = Settings(data.resolve(), path.resolve(), points, normals, device)
-    kept = None if out is None else LineStore(out, overwrite)
+    kept = None if out is None else LineCache(out, overwrite)
     count = workers or os.cpu_count() or 1
     chosen = draw_pairs(all_pairs, jobs)
     with progress_bars([*method, *[JOBS] * bool(chosen)]) as progress:
@@ -112,7 +112,7 @@ def objects(
     from dataclasses import replace
 
     from nrdf.training.provenance import git_commit
-    from nrdf_benchmark.objects_figure import draw_worst
+    from nrdf_benchmark.objects.picture import draw_worst
 
     origin = {
         "command": command_line(),

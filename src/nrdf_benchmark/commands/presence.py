@@ -10,7 +10,7 @@ from nrdf.commands.one_run import one_run_at
 
 if TYPE_CHECKING:
     from nrdf.scans.pose_scorer import PoseScorer
-    from nrdf_benchmark.objects_match import Finder
+    from nrdf_benchmark.objects.retrieval import Finder
     from nrdf_benchmark.presence import Example
 
 
@@ -95,8 +95,8 @@ def presence(
 
 def _finder(folder: Path, model: str, device: str) -> tuple[Finder, list[str]]:
     from nrdf.field.zoo import find_weights
-    from nrdf_benchmark.objects import read_objects
-    from nrdf_benchmark.objects_match import Finder, Settings
+    from nrdf_benchmark.objects.dataset import read_objects
+    from nrdf_benchmark.objects.retrieval import Finder, Settings
 
     settings = Settings(folder.resolve(), find_weights(model).resolve(), device=device)
     return Finder(settings), [item.key for item in read_objects(folder, ("chair", "stool"))]

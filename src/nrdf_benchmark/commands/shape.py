@@ -47,7 +47,7 @@ def shape(
         out: Folder for the table (Markdown), and every shape's figures (CSV, JSON).
     """
     from nrdf.training.provenance import git_commit
-    from nrdf_benchmark.methods import find_methods
+    from nrdf_benchmark.methods.registry import find_methods
     from nrdf_benchmark.shape import (
         Settings,
         check_methods,

@@ -10,8 +10,10 @@ from nrdf.commands.one_run import one_run_at
 from nrdf.io.bounds import Count, NonNegativeCount
 
 if TYPE_CHECKING:
-    from nrdf_benchmark.latency import Failure, RetrievalSpeed, TrainingSpeed
-    from nrdf_benchmark.transfer_speed import TransferSpeed
+    from nrdf_benchmark.speed.measure import Failure
+    from nrdf_benchmark.speed.retrieval import RetrievalSpeed
+    from nrdf_benchmark.speed.training import TrainingSpeed
+    from nrdf_benchmark.speed.transfer import TransferSpeed
 
 
 @one_run_at("out")
@@ -37,8 +39,8 @@ def speed(
         out: JSON file to write.
     """
     from nrdf.io.atomic import write_json
-    from nrdf_benchmark.latency import measure, to_json
-    from nrdf_benchmark.transfer_speed import measure_transfer
+    from nrdf_benchmark.speed.measure import measure, to_json
+    from nrdf_benchmark.speed.transfer import measure_transfer
 
     with errors.status("measuring") as status:
         retrieval, training, failures = measure(preset, device, repeats, steps, status.update)
@@ -54,7 +56,7 @@ def speed(
 
 def show_transfer_speed(transfer: TransferSpeed) -> None:
     """A table of a transfer's time by phase."""
-    from nrdf_benchmark.transfer_speed import TRANSFER_BAR_S
+    from nrdf_benchmark.speed.transfer import TRANSFER_BAR_S
 
     title = f"\ntransfer, {transfer.regions} regions, {transfer.points} points"
     shown = table(title, "", "s", "must keep to")
@@ -69,7 +71,7 @@ def show_speeds(
     retrieval: list[RetrievalSpeed], training: list[TrainingSpeed], failures: list[Failure]
 ) -> None:
     """Two tables, and what could not be measured."""
-    from nrdf_benchmark.latency import BARS
+    from nrdf_benchmark.speed.measure import BARS
 
     names = (f"{s.preset} ({s.model}, {s.device})" for s in retrieval)
     shown = table("retrieval", "", *names, "default must keep to")

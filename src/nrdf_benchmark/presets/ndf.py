@@ -3,8 +3,8 @@
 A vector-neuron PointNet (Deng et al., ICCV 2021) embeds the shape as 256 vectors that turn with
 it; an occupancy decoder sees a point through its inner products with them, and its activations are
 the descriptor. So descriptors do not change when shape and point are turned or moved together.
-There is no inverse descriptor function: `nrdf_benchmark.ndf_search` searches the target's points. A
-rival that the benchmark trains and runs like ours.
+There is no inverse descriptor function; `nrdf_benchmark.methods.ndf_search` searches the target's
+points instead.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def test_an_interrupt_without_a_folder_promises_nothing(root, monkeypatch, capsy
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("nrdf_benchmark.bsrc.read_bsrc", interrupted)
+    monkeypatch.setattr("nrdf_benchmark.bsrc.dataset.read_bsrc", interrupted)
     words = f"eval bsrc --data {root} --category chair --method copy"
     assert cli.run(words.split()) == 130
     assert said(capsys) == "nrdf: interrupted"

@@ -1,0 +1,31 @@
+"""The speed of training steps."""
+
+from __future__ import annotations
+
+import pytest
+
+from nrdf.training.config import load_config
+from nrdf_benchmark.speed.training import measure_training
+
+
+@pytest.fixture
+def small_config(monkeypatch):
+    """The default preset's field trained in two stages of very small batches."""
+    content = {
+        "preset": "default",
+        "data": {"encoder_points": 128, "queries": 64, "correspondences": 32, "cloud_points": 64},
+        "stages": [
+            {"name": "shape", "weights": {"occupancy": 1}, "steps": 9, "batch_size": 2},
+            {"name": "all", "weights": {"correspondence": 1}, "steps": 9, "batch_size": 3},
+        ],
+    }
+    monkeypatch.setattr("nrdf.training.config.load_config", lambda preset: load_config(content))
+
+
+def test_training_speed_counts_points(small_config):
+    speeds = measure_training("default", "cpu", 1)
+    assert [(s.stage, s.batch_size) for s in speeds] == [("shape", 2), ("all", 3)]
+    for speed in speeds:
+        # A shape of each batch counts its encoder points, queries and one pair's correspondences.
+        points = speed.batch_size * (128 + 64 + 32)
+        assert speed.points_per_s * speed.step_s == pytest.approx(points, rel=0.1)
