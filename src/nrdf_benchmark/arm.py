@@ -101,7 +101,7 @@ def measure(reports: dict[str, dict[str, Any]]) -> list[ArmMetric]:
         metric("coverage lost of the plan, worst region, %", "at most 3",
                lambda r: lost(r, "planned"), 3.0),
         metric("coverage lost of what is driven, worst region, %", "at most 3",
-               lambda r: lost(r, "driven"), 3.0),
+               lambda r: lost(r, "executed"), 3.0),
         metric("times faster than real time", "at least 10",
                lambda r: r["speed"]["times_real_time"], -10.0),
     ]  # fmt: skip

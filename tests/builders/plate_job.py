@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nrdf.toolpath.types import Segment, ToolPath
+from nrdf.toolpath.types import Segment
 
 
 def write_job_on(folder, points, normals, region, segments):
@@ -12,6 +12,7 @@ def write_job_on(folder, points, normals, region, segments):
     import nrdf
     from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
     from nrdf.process.knowledge_file import write_knowledge
+    from nrdf.process.strategy import tool_path
     from nrdf.toolpath.file import write_toolpaths
     from nrdf.toolpath.types import Job
 
@@ -28,7 +29,7 @@ def write_job_on(folder, points, normals, region, segments):
         category="chair", reference=Reference(cloud="target.ply"), regions=[region]
     )
     write_knowledge(folder / "knowledge.yaml", knowledge)
-    path = ToolPath("top", "sand", "disc", 0.025, tuple(segments))
+    path = tool_path("top", process, segments)
     write_toolpaths(folder, Job("chair", "target", (path,)))
     return folder
 

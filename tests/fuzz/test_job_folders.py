@@ -21,8 +21,9 @@ from nrdf.export.registry import export_job
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
 from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.strategy import tool_path
 from nrdf.toolpath.file import read_toolpaths, write_toolpaths
-from nrdf.toolpath.types import Job, Segment, ToolPath
+from nrdf.toolpath.types import Job, Segment
 
 WRITTEN = ("csv", "json", "urscript", "krl")
 
@@ -36,10 +37,9 @@ def job(tmp_path_factory):
     points, normals = np.r_[top, top - [0, 0, 0.03]], np.r_[up, -up]
     nrdf.write_cloud(folder / "target.ply", nrdf.PointCloud(points, normals, unit="m"))
     tool = Tool(name="disc", radius_m=0.025)
-    names = ("sand", "sand 2")
     processes = [
         Process(kind="sand", name=name, stepover_m=0.03, feed_m_s=0.1, force_n=10.0, tool=tool)
-        for name in names
+        for name in ("sand", "sand 2")
     ]
     region = Region(name="top", indices=list(range(400)), processes=processes)
     reference = Reference(cloud="target.ply")
@@ -48,7 +48,7 @@ def job(tmp_path_factory):
     line = np.c_[np.linspace(-0.1, 0.1, 5), np.zeros(5), np.full(5, 0.42)]
     held = np.tile([1.0, 0.0, 0.0, 0.0], (5, 1))
     segment = Segment("process", 0, line, held, 0.1, 10.0)
-    paths = tuple(ToolPath("top", name, "disc", 0.025, (segment,)) for name in names)
+    paths = tuple(tool_path("top", process, (segment,)) for process in processes)
     pose = Similarity(upright(up_axis("z")), np.array([0.0, 0.0, 0.42]), 0.3)
     write_toolpaths(folder, Job("chair", "target", paths, pose))
     return folder
@@ -91,15 +91,16 @@ def check(folder):
         )
     if work is not None:
         np.testing.assert_allclose(work.upright @ work.upright.T, np.eye(3), atol=1e-9)
-        for path, process in zip(whole.paths, work.processes, strict=True):
-            assert process.label == path.process
+        for path, strategy in zip(whole.paths, work.strategies, strict=True):
+            assert strategy.standoff_m == path.strategy.standoff_m >= 0
 
 
 def test_the_job_itself_is_good(job):
     whole, work = use(job)
     assert len(whole.paths) == 2
     if work is not None:
-        assert [process.name for process in work.processes] == ["sand", "sand 2"]
+        assert [path.process for path in whole.paths] == ["sand", "sand 2"]
+        assert len(work.strategies) == 2
 
 
 @tries(60)

@@ -18,12 +18,12 @@ def report(achieved: float, reached: float = 0.97):
     path = {
         "position_error_m": 2e-5,
         "axis_error_rad": 3e-4,
-        "coverage": {"planned": 0.99, "driven": 0.95, "achieved": achieved},
+        "coverage": {"planned": 0.99, "executed": 0.95, "achieved": achieved},
         "force": {"within": 2 * reached - 1, "seconds": 100 * reached},
     }
     other = {
         **path,
-        "coverage": {"planned": 1.0, "driven": 1.0, "achieved": 1.0},
+        "coverage": {"planned": 1.0, "executed": 1.0, "achieved": 1.0},
         "force": None,
     }
     return {

@@ -15,11 +15,10 @@ from nrdf.robot.model.arm import load_arm
 from nrdf.robot.model.cell import Cell, Placement, upright_rotation
 from nrdf.robot.model.signed_distance import distance_field_from_points
 from nrdf.robot.model.tool import tool_of
-from nrdf.robot.planning.follow import follow
-from nrdf.robot.planning.inverse_kinematics import Library
-from nrdf.robot.planning.lines import lines_of
+from nrdf.robot.planning.inverse_kinematics import SeedLibrary
+from nrdf.robot.planning.joint_path_planner import plan_joint_paths
 from nrdf.robot.planning.program import find_home
-from nrdf.robot.simulation.collision_free import drive
+from nrdf.robot.simulation.collision_rejection import run
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.types import Segment, ToolPath
 
@@ -58,14 +57,14 @@ def scene():
     )
     distance_field = distance_field_from_points(points, normals)
     cell = Cell.build(load_arm(), tool_of(path), distance_field, PLACE, UP)
-    library = Library.build(cell, 20_000, rng)
-    return cell, library, lines_of(path), Surface(points, normals)
+    library = SeedLibrary.build(cell, 20_000, rng)
+    return cell, library, path.groups, Surface(points, normals)
 
 
 @pytest.fixture(scope="module")
 def strokes(scene):
     cell, library, lines, _ = scene
-    return follow(cell, library, lines)
+    return plan_joint_paths(cell, library, lines)
 
 
 def test_the_tool_leans_away_from_a_wall_and_only_there(scene, strokes):
@@ -74,34 +73,34 @@ def test_the_tool_leans_away_from_a_wall_and_only_there(scene, strokes):
     assert covered[0].all()
     lean = np.zeros(12)
     for s in driven:
-        cosine = (s.axes * lines[0].axes[s.first : s.last + 1]).sum(axis=1)
+        cosine = (s.axes * lines[0].process.axes[s.first : s.last + 1]).sum(axis=1)
         lean[s.first : s.last + 1] = np.arccos(np.clip(cosine, -1.0, 1.0))
     assert (lean[:10] < 1e-6).all()
-    assert 0.01 < lean[-1] < cell.tool.leans_rad + 1e-6
+    assert 0.01 < lean[-1] < cell.tool.max_tilt_rad + 1e-6
     tail = -next(s for s in driven if s.last == 11).axes[-1]
     assert tail[0] < -0.01
 
 
 def test_a_pad_leans_as_far_as_it_gives(scene):
     cell = scene[0]
-    assert cell.tool.radius_m * np.sin(cell.tool.leans_rad) == pytest.approx(0.002)
+    assert cell.tool.radius_m * np.sin(cell.tool.max_tilt_rad) == pytest.approx(0.002)
 
 
 def drive_it(scene, strokes, shift):
     cell, library, lines, surface = scene
     rng = np.random.default_rng(0)
     home = find_home(cell, library)
-    return drive(cell, "top", lines, strokes[0], home, library, rng, surface, np.array(shift))
+    return run(cell, "top", lines, strokes[0], home, library, rng, surface, np.array(shift))
 
 
 def test_what_touches_is_left_out_and_said(scene, strokes):
     whole = drive_it(scene, strokes, (0.0, 0.0, 0.0))
-    assert not whole.avoided and not whole.collisions
+    assert not whole.rejected and not whole.collisions
     # The wall comes nearer by more than the clearance that was planned with.
     done = drive_it(scene, strokes, (-0.012, 0.0, 0.0))
-    assert "process" in {c.kind for c in done.avoided}
+    assert "process" in {c.kind for c in done.rejected}
     assert not done.collisions
-    left = {k for s in done.program.strokes for k in range(s.first, s.last + 1)}
+    left = {k for s in done.program.joint_paths for k in range(s.first, s.last + 1)}
     assert set(range(8)) <= left and 11 not in left
 
 
@@ -114,4 +113,8 @@ def test_the_object_turns_about_the_turntables_axis(scene):
         Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0, 0.7)),
         UP,
     )
-    np.testing.assert_allclose(cell.turned(np.array([0.7])).poses[0], placed.poses[1], atol=1e-12)
+    np.testing.assert_allclose(
+        cell.at_turntable_angles(np.array([0.7])).T_base_object[0],
+        placed.T_base_object[1],
+        atol=1e-12,
+    )

@@ -22,7 +22,7 @@ from nrdf.robot.model.cell import Cell, Placement, upright_rotation
 from nrdf.robot.model.signed_distance import _without_specks, distance_field_from_points
 from nrdf.robot.model.spheres import cover_box, cover_capsule, cover_cylinder
 from nrdf.robot.model.tool import tool_of
-from nrdf.robot.planning.inverse_kinematics import Library, errors, solve
+from nrdf.robot.planning.inverse_kinematics import SeedLibrary, pose_errors, solve
 from nrdf.robot.planning.timing import STEP_S, time_parameterize
 from nrdf.toolpath.frames import surface_frames
 from nrdf.toolpath.types import Segment, ToolPath
@@ -77,10 +77,10 @@ def test_inverse_kinematics_reach_what_the_arm_can_reach(cell):
     rng = np.random.default_rng(2)
     frames = cell.chain.frames(rng.uniform(-2, 2, (40, 6)))
     targets, axes = frames.tcp, frames.tool[:, :, 2]
-    library = Library.build(cell, 8000, rng)
-    joints = library.guesses(targets, axes, 6).reshape(240, 6)
+    library = SeedLibrary.build(cell, 8000, rng)
+    joints = library.nearest(targets, axes, 6).reshape(240, 6)
     joints, good = solve(cell.chain, joints, targets.repeat(6, axis=0), axes.repeat(6, axis=0))
-    away, angle = errors(
+    away, angle = pose_errors(
         cell.chain.frames(joints), targets.repeat(6, axis=0), axes.repeat(6, axis=0)
     )
     assert good.reshape(40, 6).any(axis=1).mean() > 0.9
@@ -134,10 +134,10 @@ def test_timing_keeps_feed_and_limits(arm):
     joints = np.linspace([0.0] * 6, [0.4] * 6, 21)
     calm = time_parameterize(arm.chain, joints, np.full(20, 0.1))
     assert len(calm.joints) * STEP_S == pytest.approx(2.0, rel=0.2)
-    assert (calm.pace == 1.0).all()
+    assert (calm.feed_share == 1.0).all()
     hurried = time_parameterize(arm.chain, joints, np.full(20, 0.001))
     assert (np.abs(hurried.speeds) <= arm.chain.speeds * 1.001).all()
-    assert (hurried.pace[:-1] < 1.0).all()
+    assert (hurried.feed_share[:-1] < 1.0).all()
     np.testing.assert_allclose(hurried.speeds[[0, -1]], 0.0, atol=1e-6)
 
 
@@ -222,7 +222,7 @@ def test_force_is_kept_on_an_object_that_is_5_mm_off(plate_job, arm, shift):
     assert out.reached == out.waypoints == 27
     assert out.force_within is not None and out.force_within > 0.95
     assert out.achieved.worked == pytest.approx(out.planned.worked, abs=0.03)
-    for found in (out.planned, out.driven, out.achieved):
+    for found in (out.planned, out.executed, out.achieved):
         assert found.worked + sum(found.left_out.values()) + found.unreached == pytest.approx(1.0)
     # Three lines do not work the whole plate.
     assert out.achieved.unreached == pytest.approx(0.6, abs=0.03)
@@ -298,32 +298,25 @@ def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_t
     assert not given.assumed and given.origin == "up is z, as given"
 
 
-def test_each_path_is_measured_with_the_process_that_made_it(plate_job, tmp_path):
-    from nrdf.process.knowledge_file import read_knowledge, write_knowledge
+def test_each_path_has_the_strategy_that_made_it(plate_job, tmp_path):
     from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 
     for name in ("target.ply", "knowledge.yaml"):
         (tmp_path / name).write_bytes((plate_job / name).read_bytes())
-    knowledge = read_knowledge(tmp_path / "knowledge.yaml")
-    (sand,) = knowledge.regions[0].processes
-
-    def write(*processes):
-        region = knowledge.regions[0].model_copy(update={"processes": list(processes)})
-        write_knowledge(
-            tmp_path / "knowledge.yaml", knowledge.model_copy(update={"regions": [region]})
-        )
-
     whole = read_toolpaths(plate_job)
     (path,) = whole.paths
-    second = sand.model_copy(update={"name": "sand 2", "edge_margin_m": 0.05})
-    write(sand, second)
-    write_toolpaths(tmp_path, replace(whole, paths=(replace(path, process="sand 2"), path)))
-    assert [p.edge_margin_m for p in read_simulation_job(tmp_path).processes] == [0.05, 0.0]
-    # A job of before: nothing tells which of the two it was.
-    write(sand, second.model_copy(update={"name": None}))
-    write_toolpaths(tmp_path, whole)
-    with pytest.raises(ProcessError, match=r"'sand' on 'top' may be of 2 processes of that name"):
+    other = replace(path, process="sand 2", strategy=replace(path.strategy, edge_margin_m=0.05))
+    write_toolpaths(tmp_path, replace(whole, paths=(other, path)))
+    assert [s.edge_margin_m for s in read_simulation_job(tmp_path).strategies] == [0.05, 0.0]
+    # A job of an earlier nrdf: nothing tells how it was planned.
+    write_toolpaths(tmp_path, replace(whole, paths=(replace(path, strategy=None),)))
+    with pytest.raises(
+        ProcessError, match=r"'sand' on 'top' has no strategy in its toolpaths\.json"
+    ):
+        read_simulation_job(tmp_path)
+    write_toolpaths(tmp_path, replace(whole, paths=(replace(path, region="side"),)))
+    with pytest.raises(ProcessError, match=r"'sand' on 'side': its knowledge\.yaml has no such"):
         read_simulation_job(tmp_path)
 
 
@@ -409,7 +402,7 @@ def test_the_folder_of_a_simulation(plate_job, arm, tmp_path):
     page = (tmp_path / "report.html").read_text()
     assert "plate" in page
     said = "the job does not say how its object lies: taken to have +Y up and +X ahead"
-    assert report["placement"]["object_lies"] == said and said in page
+    assert report["placement"]["object_pose"] == said and said in page
     assert any(said in line for line in report["warnings"])
     coverage = report["paths"][0]["coverage"]
     shares = coverage["achieved"], *coverage["left_out"].values(), coverage["unreached"]

@@ -11,7 +11,7 @@ if find_spec("mujoco") is None:
     pytest.skip("pip install 'nrdf[robot]'", allow_module_level=True)
 
 from nrdf.robot.model.cell import Placement
-from nrdf.robot.report.pictures import COVERAGE, STILL, draw
+from nrdf.robot.report.pictures import COVERAGE, STILL, draw_pictures
 from nrdf.robot.simulation.job import read_simulation_job
 from nrdf.robot.simulation.simulate import simulate
 
@@ -22,7 +22,7 @@ def test_pictures_show_arm_and_object(plate_job, arm, tmp_path):
 
     place = Placement((0.75, 0.0, 0.3), np.pi, 0.0, (0.0,))
     done = simulate(read_simulation_job(plate_job), arm, placement=place)
-    missing = draw(tmp_path, done, film=False)
+    missing = draw_pictures(tmp_path, done, film=False)
     if missing:
         pytest.skip(missing)
     still, coverage = imread(tmp_path / STILL)[..., :3], imread(tmp_path / COVERAGE)[..., :3]

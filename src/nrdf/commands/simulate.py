@@ -107,11 +107,11 @@ def _placement(base: tuple[str, ...], stand: float, turns: int | None) -> tuple[
 
 def show_simulation(report: dict[str, Any]) -> None:
     """A table of a simulation's tool paths, what to look at, and the whole."""
-    from nrdf.robot.report.content import COLUMNS, figures
+    from nrdf.robot.report.content import COLUMNS, metrics_row
 
     shown = table("", "region", "process", *COLUMNS, texts=2)
     for path in report["paths"]:
-        shown.add_row(path["region"], path["process"], *figures(path))
+        shown.add_row(path["region"], path["process"], *metrics_row(path))
     show(shown)
     for warning in report["warnings"]:
         errors.print(warning, style="yellow")
@@ -123,7 +123,7 @@ def show_simulation(report: dict[str, Any]) -> None:
         f"{total['reached_share']:.1%} of {total['waypoints']} waypoints reached, "
         f"{total['collisions']} moves with a collision{force}; {minutes} min {seconds} s\n"
         f"base at {' '.join(f'{x:.2f}' for x in place['base_m'])} m, object "
-        f"{place['stand_m']:.2f} m above the floor, {len(place['turns_used_rad'])} turns; "
+        f"{place['stand_m']:.2f} m above the floor, {len(place['turntable_used_rad'])} turns; "
         f"{speed['ik_ms_per_waypoint']:.1f} ms a waypoint, simulation "
         f"{speed['times_real_time']:.0f} times faster than real time"
     )

@@ -12,11 +12,11 @@ from nrdf.robot.model.signed_distance import SignedDistanceField
 from nrdf.robot.model.spheres import Spheres, cover_capsule
 from nrdf.robot.model.tool import Tool
 
-COLUMN_M = 0.09
+COLUMN_RADIUS_M = 0.09
 """Radius of the column that a raised base stands on."""
-_ALONG = 0.9  # cosine to up from which a direction is none to face
-_NEIGHBOURS = 2  # links that far apart along the arm cannot be checked against each other
-_ALWAYS = 0.3  # share of random places in which two links must touch to be taken for neighbours
+_ALONG = 0.9  # cosine to up above which a direction cannot be faced
+_NEIGHBOURS = 2  # links fewer than that apart along the arm always touch
+_ALWAYS = 0.3  # share of random configurations in which two links touch, to be neighbours
 
 
 @dataclass(frozen=True)
@@ -24,34 +24,37 @@ class Placement:
     """Where the arm's base and the object stand.
 
     The cell's frame has z up and its origin on the floor under the middle of the object, on the
-    turntable's axis; x is where the object faces at turn 0 (the category's own x).
+    turntable's axis; x is where the object faces at turntable angle 0 (the category's own x).
 
     base_m: (3,) of the arm's base; base_yaw_rad: about z, from the cell's x to the base's x;
-    stand_m: height of the object's lowest point above the floor; turns_rad: (k,) of the turntable.
+    stand_m: height of the object's lowest point above the floor; turntable_rad: (k,) angles that
+    the turntable may stop at. A *turntable index* is an index into them.
     """
 
     base_m: tuple[float, float, float]
     base_yaw_rad: float
     stand_m: float
-    turns_rad: tuple[float, ...]
+    turntable_rad: tuple[float, ...]
 
     def T_cell_base(self) -> np.ndarray:
+        """Pose (4, 4) of the arm's base."""
         return _pose(self.base_yaw_rad, self.base_m)
 
     def T_cell_object(self, distance_field: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
-        """Poses (k, 4, 4) of the object's frame at each turn.
+        """Poses (k, 4, 4) of the object's frame at each turntable index.
 
         upright: (3, 3), as `upright_rotation` has it.
         """
-        turned = distance_field.samples @ upright.T
-        low, high = turned.min(axis=0), turned.max(axis=0)
+        samples = distance_field.samples @ upright.T
+        low, high = samples.min(axis=0), samples.max(axis=0)
         standing = np.eye(4)
         standing[:3, :3] = upright
         standing[:3, 3] = -0.5 * (low + high)
         standing[2, 3] = self.stand_m - float(low[2])
-        return np.array([_pose(turn, (0.0, 0.0, 0.0)) @ standing for turn in self.turns_rad])
+        return np.array([_pose(angle, (0.0, 0.0, 0.0)) @ standing for angle in self.turntable_rad])
 
     def T_base_object(self, distance_field: SignedDistanceField, upright: np.ndarray) -> np.ndarray:
+        """The same in the frame of the arm's base."""
         return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(distance_field, upright)
 
 
@@ -77,11 +80,11 @@ def upright_rotation(up: np.ndarray, forward: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Cell:
-    """Everything that clearances are asked of, in the frame of the arm's base.
+    """Everything that can collide, in the frame of the arm's base.
 
     chain: with the tool's centre point. spheres: of arm and tool; coarse_spheres: fewer and larger
-    ones, for arm against arm. poses: (k, 4, 4), T_base_object at each turn. turntable_m: (3,) on
-    the turntable's axis. floor_m: its height. pairs: (p, 2) of those that must not meet.
+    ones, for arm against arm. T_base_object: (k, 4, 4), by turntable index. turntable_m: (3,) on
+    the turntable's axis. floor_m: its height. pairs: (p, 2) of coarse spheres that must not meet.
     """
 
     arm: Arm
@@ -90,11 +93,11 @@ class Cell:
     spheres: Spheres
     coarse_spheres: Spheres
     distance_field: SignedDistanceField
-    poses: np.ndarray
+    T_base_object: np.ndarray
     turntable_m: np.ndarray
     floor_m: float
     pairs: np.ndarray
-    turns_rad: tuple[float, ...]
+    turntable_rad: tuple[float, ...]
 
     @staticmethod
     def build(
@@ -114,46 +117,52 @@ class Cell:
             spheres=arm.spheres + column + tool.spheres(size, flange),
             coarse_spheres=coarse,
             distance_field=distance_field,
-            poses=placement.T_base_object(distance_field, upright),
+            T_base_object=placement.T_base_object(distance_field, upright),
             turntable_m=np.linalg.inv(placement.T_cell_base())[:3, 3],
             floor_m=-placement.base_m[2],
             pairs=_pairs(arm.chain, coarse),
-            turns_rad=placement.turns_rad,
+            turntable_rad=placement.turntable_rad,
         )
 
-    def placed(self, placement: Placement, upright: np.ndarray) -> Cell:
-        """The same arm, tool and object at another place."""
+    def with_placement(self, placement: Placement, upright: np.ndarray) -> Cell:
+        """The same arm, tool and object with another placement."""
         return Cell.build(self.arm, self.tool, self.distance_field, placement, upright)
 
     def shifted(self, shift_m: np.ndarray) -> Cell:
-        """The same with the object off its place by (3,), in its own frame."""
+        """The same with the object shifted by (3,), m, in its own frame."""
         shift = np.eye(4)
         shift[:3, 3] = shift_m
-        return replace(self, poses=self.poses @ shift)
+        return replace(self, T_base_object=self.T_base_object @ shift)
 
-    def turned(self, angles_rad: np.ndarray) -> Cell:
-        """The same with the object at other turns (k,)."""
+    def at_turntable_angles(self, angles_rad: np.ndarray) -> Cell:
+        """The same with other angles (k,) of the turntable."""
         poses = []
-        for angle in angles_rad - self.turns_rad[0]:
+        for angle in angles_rad - self.turntable_rad[0]:
             about = _pose(float(angle), (0.0, 0.0, 0.0))
             about[:3, 3] = self.turntable_m - about[:3, :3] @ self.turntable_m
-            poses.append(about @ self.poses[0])
-        return replace(self, poses=np.array(poses), turns_rad=tuple(angles_rad.tolist()))
+            poses.append(about @ self.T_base_object[0])
+        angles = tuple(angles_rad.tolist())
+        return replace(self, T_base_object=np.array(poses), turntable_rad=angles)
 
     def to_base(
-        self, turn: np.ndarray, points: np.ndarray, vectors: np.ndarray
+        self, turntable_index: np.ndarray, points: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points and vectors (b, 3) of the object's frame in the base's, at turns (b,)."""
-        pose = self.poses[turn]
+        """Points and vectors (b, 3) of the object's frame in that of the base.
+
+        turntable_index: (b,).
+        """
+        pose = self.T_base_object[turntable_index]
         placed = np.einsum("bij,bj->bi", pose[:, :3, :3], points) + pose[:, :3, 3]
         return placed, np.einsum("bij,bj->bi", pose[:, :3, :3], vectors)
 
-    def clearance(self, frames: Frames, turn: np.ndarray) -> Clearance:
-        """Distance between arm or tool and object or floor, for configurations (b,) at turns."""
-        centres = self.spheres.at(frames.rotations, frames.places)
-        pose = self.poses[turn]
+    def clearance(self, frames: Frames, turntable_index: np.ndarray) -> Clearance:
+        """Distance between arm or tool and object or floor, for configurations (b,).
+
+        turntable_index: (b,)."""
+        centres = self.spheres.at(frames.rotations, frames.positions)
+        pose = self.T_base_object[turntable_index]
         local = np.matmul(centres - pose[:, None, :3, 3], pose[:, :3, :3])
-        away, gradient = self.distance_field.distances(local)
+        away, gradients = self.distance_field.distances(local)
         away = away - self.spheres.radii
         # The base stands on the floor.
         low = centres[..., 2] - self.spheres.radii - self.floor_m
@@ -163,16 +172,16 @@ class Cell:
         closest, height = away[row, nearest], low[row, lowest]
         on_floor = height < closest
         sphere = np.where(on_floor, lowest, nearest)
-        slope = np.einsum("bij,bj->bi", pose[:, :3, :3], gradient[row, nearest])
-        slope = np.where(on_floor[:, None], [0.0, 0.0, 1.0], slope)
+        gradient = np.einsum("bij,bj->bi", pose[:, :3, :3], gradients[row, nearest])
+        gradient = np.where(on_floor[:, None], [0.0, 0.0, 1.0], gradient)
         least = np.where(on_floor, height, closest)
-        return Clearance(least, sphere, centres[row, sphere], slope, on_floor)
+        return Clearance(least, sphere, centres[row, sphere], gradient, on_floor)
 
-    def own_clearance(self, frames: Frames) -> np.ndarray:
+    def self_clearance(self, frames: Frames) -> np.ndarray:
         """Least distance (b,) between parts of arm and tool that are not neighbours."""
         if not len(self.pairs):
             return np.full(len(frames.tcp), np.inf)
-        centres = self.coarse_spheres.at(frames.rotations, frames.places).astype(np.float32)
+        centres = self.coarse_spheres.at(frames.rotations, frames.positions).astype(np.float32)
         (one, two), size = self.pairs.T, len(self.coarse_spheres.radii)
         # All squared distances by one product: the pairs alone, with their offsets, take longer.
         square = np.einsum("bma,bma->bm", centres, centres)
@@ -187,21 +196,21 @@ class Cell:
 @dataclass(frozen=True)
 class Clearance:
     """least: (b,), m, negative where something is hit; sphere: (b,) that is nearest, point: (b, 3)
-    its centre, slope: (b, 3) the direction away; floor: (b,) whether it is the floor."""
+    its centre, gradient: (b, 3) the direction away; floor: (b,) whether it is the floor."""
 
     least: np.ndarray
     sphere: np.ndarray
     point: np.ndarray
-    slope: np.ndarray
+    gradient: np.ndarray
     floor: np.ndarray
 
 
 def _column(floor: float) -> Spheres:
     """The column that a raised base stands on, from the floor up."""
-    if floor > -COLUMN_M:
+    if floor > -COLUMN_RADIUS_M:
         return Spheres.none()
-    start, end = np.array([0.0, 0.0, floor]), np.array([0.0, 0.0, -0.5 * COLUMN_M])
-    centres, radius = cover_capsule(start, end, COLUMN_M)
+    start, end = np.array([0.0, 0.0, floor]), np.array([0.0, 0.0, -0.5 * COLUMN_RADIUS_M])
+    centres, radius = cover_capsule(start, end, COLUMN_RADIUS_M)
     return Spheres(centres, np.full(len(centres), radius), np.zeros(len(centres), int))
 
 
@@ -212,7 +221,7 @@ def _pairs(chain: Chain, spheres: Spheres) -> np.ndarray:
         np.maximum(chain.lower, -np.pi), np.minimum(chain.upper, np.pi), (200, chain.size)
     )
     frames = chain.frames(joints)
-    centres = spheres.at(frames.rotations, frames.places)
+    centres = spheres.at(frames.rotations, frames.positions)
     links = np.unique(spheres.links)
     found = []
     for i, one in enumerate(links):

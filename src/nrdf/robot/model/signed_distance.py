@@ -1,4 +1,4 @@
-"""The object as something to collide with: its signed distance on a grid, and a mesh of it.
+"""The object as an obstacle: its signed distance on a grid, and a mesh of it.
 
 Nothing is made convex: a distance field has as many holes as the object.
 """
@@ -97,9 +97,9 @@ def distance_field_from_points(points: np.ndarray, normals: np.ndarray) -> Signe
     height = np.einsum("vka,vka->vk", offset, normals[nearest])
     weight = np.exp(-((far / np.maximum(far[:, :1], 1e-4)) ** 2))
     drop = (weight * height).sum(axis=1) / weight.sum(axis=1)
-    lean = normals[nearest[:, 0]]
+    direction = normals[nearest[:, 0]]
     drop = np.clip(drop, -1.5 * grid.cell, 1.5 * grid.cell)
-    vertices = vertices - drop[:, None] * lean
+    vertices = vertices - drop[:, None] * direction
     origin = f"winding number of {len(points)} scanned points, cells of {1e3 * grid.cell:.0f} mm"
     return grid.distance_field(value, vertices, faces, np.concatenate([points, vertices]), origin)
 
@@ -173,7 +173,7 @@ class _Grid:
         return _Grid(low, cell, (nx, ny, nz))
 
     def nodes(self, index: np.ndarray) -> np.ndarray:
-        """Places (m, 3) of nodes given by flat index (m,)."""
+        """Positions (m, 3) of nodes given by flat index (m,)."""
         return self.corner + self.cell * np.stack(np.unravel_index(index, self.shape), axis=1)
 
     def filled(self, tree: cKDTree, winding: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

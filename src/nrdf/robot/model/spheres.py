@@ -1,4 +1,4 @@
-"""Spheres that enclose an arm's shapes: what is asked for clearance while planning."""
+"""Spheres that enclose an arm's shapes, for distances to what it must not touch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 _MOST_ALONG = 24
 FINE, COARSE = 0.9, 1.5
-"""Distances between centres, in radii: spheres that follow a shape, and few spheres."""
+"""Distances between centres, in radii: many that follow a shape closely, or few."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,15 @@ class Spheres:
 
     @staticmethod
     def none() -> Spheres:
+        """No spheres."""
         return Spheres(np.zeros((0, 3)), np.zeros(0), np.zeros(0, int))
 
-    def at(self, rotations: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def at(self, rotations: np.ndarray, positions: np.ndarray) -> np.ndarray:
         """Centres (b, m, 3) where the links' frames are (n + 1, b, 3, 3) and (n + 1, b, 3)."""
-        centres = np.empty((places.shape[1], len(self.radii), 3))
-        for link, own, here in self._by_link:
-            turned = np.matmul(here, np.swapaxes(rotations[link], 1, 2))
-            centres[:, own] = turned + places[link][:, None]
+        centres = np.empty((positions.shape[1], len(self.radii), 3))
+        for link, rows, local in self._by_link:
+            turned = np.matmul(local, np.swapaxes(rotations[link], 1, 2))
+            centres[:, rows] = turned + positions[link][:, None]
         return centres
 
     @cached_property

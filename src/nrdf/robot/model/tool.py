@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from nrdf.robot.model.spheres import FINE, Spheres, cover_capsule, cover_cylinder
 from nrdf.toolpath.types import ToolPath
 
-BEND_RAD, BEFORE_M, BEHIND_M = np.radians(60.0), 0.20, 0.10
-"""A tool's neck is bent by that much, so far from the flange and from the tool centre point, unless
-the knowledge file gives the tool's `tcp_m`. Turned about its axis it keeps clear of what stands
-beside the surface, where a straight tool would not."""
-PAD_GIVES_M = 0.002
+BEND_RAD, SHAFT_M, NECK_M = np.radians(60.0), 0.20, 0.10
+"""The default tool: a shaft, then a neck bent by that angle up to the tool centre point. Where the
+knowledge file gives the tool's `tcp_m`, that counts instead. A bent neck can be turned away from
+what stands beside the surface."""
+PAD_GIVE_M = 0.002
 """How far the pad gives at the commanded force: its stiffness is the force by that."""
 PAD_M = 0.020
 """Thickness of the soft end that presses on the surface; what is behind it must touch nothing."""
@@ -22,7 +22,7 @@ _SENSOR_RADIUS, _SENSOR_LENGTH = 0.0375, 0.04
 _HOLDER_LENGTH, _HOLDER_SHARE, _NECK_SHARE, _THINNEST = 0.010, 0.4, 0.4, 0.005
 _SHAFT_SHARE = 1.5  # of the neck's radius, between sensor and bend
 _NOZZLE_RADIUS = 0.010
-_MOST_LEAN_RAD, _NOZZLE_LEANS_RAD = np.radians(15.0), np.radians(10.0)
+_MAX_TILT_RAD, _NOZZLE_TILT_RAD = np.radians(15.0), np.radians(10.0)
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,14 @@ class Tool:
     parts: tuple[Part, ...]
 
     @property
-    def leans_rad(self) -> float:
-        """How far the axis may be off the planned one where that is blocked: for a pad as far as it
-        gives, so that its whole face still presses."""
+    def max_tilt_rad(self) -> float:
+        """The largest tilt of the tool axis from the planned one, where that is blocked.
+
+        For a pad as far as it gives at the rim, so that its whole face still presses.
+        """
         if not self.presses:
-            return _NOZZLE_LEANS_RAD
-        return min(float(np.arcsin(min(PAD_GIVES_M / self.radius_m, 1.0))), _MOST_LEAN_RAD)
+            return _NOZZLE_TILT_RAD
+        return min(float(np.arcsin(min(PAD_GIVE_M / self.radius_m, 1.0))), _MAX_TILT_RAD)
 
     def spheres(self, link: int, T_link_flange: np.ndarray, step: float = FINE) -> Spheres:
         """Spheres around everything that must touch nothing, `step` radii apart."""
@@ -69,8 +71,8 @@ class Tool:
                 along = part.end - part.start
                 half = 0.5 * float(np.linalg.norm(along))
                 centres, radius = cover_cylinder(part.radius, half, step)
-                turn = _z_towards(along)
-                centres = centres @ turn.T + 0.5 * (part.start + part.end)
+                rotation = _rotation_from_z(along)
+                centres = centres @ rotation.T + 0.5 * (part.start + part.end)
             else:
                 centres, radius = cover_capsule(part.start, part.end, part.radius, step)
             centres = centres @ T_link_flange[:3, :3].T + T_link_flange[:3, 3]
@@ -84,7 +86,7 @@ def tool_of(path: ToolPath) -> Tool:
     presses = any(segment.force_n is not None for segment in path.segments)
     T_flange_tcp = np.eye(4)
     T_flange_tcp[:3, :3] = Rotation.from_euler("y", BEND_RAD).as_matrix()
-    T_flange_tcp[:3, 3] = BEHIND_M * T_flange_tcp[:3, 2] + [0.0, 0.0, BEFORE_M]
+    T_flange_tcp[:3, 3] = NECK_M * T_flange_tcp[:3, 2] + [0.0, 0.0, SHAFT_M]
     if path.tcp_m is not None:
         T_flange_tcp = np.eye(4)
         T_flange_tcp[:3, 3] = path.tcp_m
@@ -97,7 +99,7 @@ def tool_of(path: ToolPath) -> Tool:
 def _parts(T_flange_tcp: np.ndarray, radius: float, presses: bool) -> tuple[Part, ...]:
     tip, axis = T_flange_tcp[:3, 3], T_flange_tcp[:3, 2]
     front = np.array([0.0, 0.0, _SENSOR_LENGTH])
-    bend = tip - min(BEHIND_M, 0.5 * float(np.linalg.norm(tip - front))) * axis
+    bend = tip - min(NECK_M, 0.5 * float(np.linalg.norm(tip - front))) * axis
     sensor = Part("force sensor", np.zeros(3), front, _SENSOR_RADIUS, flat=True)
     neck = max(_NECK_SHARE * radius, _THINNEST) if presses else _NOZZLE_RADIUS
     shaft = Part("shaft", front, bend, _SHAFT_SHARE * neck)
@@ -113,7 +115,7 @@ def _parts(T_flange_tcp: np.ndarray, radius: float, presses: bool) -> tuple[Part
     )
 
 
-def _z_towards(direction: np.ndarray) -> np.ndarray:
+def _rotation_from_z(direction: np.ndarray) -> np.ndarray:
     """A rotation (3, 3) that takes z to a direction (3,)."""
     along = direction / np.linalg.norm(direction)
     helper = np.eye(3)[int(np.argmin(np.abs(along)))]

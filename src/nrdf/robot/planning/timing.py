@@ -1,4 +1,4 @@
-"""When the arm is where: joint paths driven at their feeds, within the joints' limits."""
+"""Time parameterization: joint paths at their feeds, within the joints' limits."""
 
 from __future__ import annotations
 
@@ -11,37 +11,40 @@ from scipy.interpolate import PchipInterpolator
 from nrdf.robot.model.kinematics import Chain
 
 STEP_S = 0.004
-"""Of the simulation and of the arm's control."""
+"""Time step of the simulation and of the arm's control."""
 FREE_SHARE = 0.9
 """Share of the joints' speed limits that free moves use."""
-_TO_SPEED_S = 0.25  # in which a joint is brought to its limit
-_FINE = 4  # places between two waypoints at which limits are looked at
+_ACCELERATION_S = 0.25  # in which a joint reaches its speed limit
+_SAMPLES = 4  # between two waypoints, at which limits are checked
 
 
 @dataclass(frozen=True)
 class TimedTrajectory:
-    """joints (t, n), rad, and their speeds (t, n) at each step of the simulation; place (t,): which
-    waypoint the arm is at, a number between 0 and the last; pace (m,): the share of its feed that
-    the joints' speed limits leave around each waypoint."""
+    """Where the arm is at each step of the simulation.
+
+    joints (t, n), rad, and their speeds (t, n). waypoint (t,): a number between 0 and the last
+    waypoint's. feed_share (m,): the share of its feed that the joints' speed limits leave around
+    each waypoint.
+    """
 
     joints: np.ndarray
     speeds: np.ndarray
-    place: np.ndarray
-    pace: np.ndarray
+    waypoint: np.ndarray
+    feed_share: np.ndarray
 
     @property
     def slowed(self) -> np.ndarray:
         """Whether (m,) the feed cannot be kept."""
-        return self.pace < 1.0
+        return self.feed_share < 1.0
 
 
 def time_parameterize(
     chain: Chain, joints: np.ndarray, seconds: np.ndarray, share: float = 1.0
 ) -> TimedTrajectory:
-    """Drive through joints (m, n), from rest to rest.
+    """The trajectory through joints (m, n), from rest to rest.
 
     seconds: (m - 1,) that each step would take at its feed; more is taken where joints are at
-    their limits. share: of the joints' speeds that is used. A smooth curve through all places is
+    their limits. share: of the joints' speeds that is used. A smooth curve through all joints is
     followed, whose speed is limited forwards and backwards (Bobrow et al., 1985, with each joint's
     acceleration limit split between its two terms).
     """
@@ -52,16 +55,16 @@ def time_parameterize(
     limits = share * chain.speeds
     needed = (np.abs(np.diff(joints, axis=0)) / limits).max(axis=1)
     kept = np.minimum(seconds / np.maximum(needed, 1e-9), 1.0)
-    paced = np.minimum(np.append(kept, 1.0), np.append(1.0, kept))
+    feed_share = np.minimum(np.append(kept, 1.0), np.append(1.0, kept))
     nominal = np.maximum(np.maximum(seconds, needed), 1e-4)
     knots = np.concatenate([[0.0], np.cumsum(nominal)])
     curve = PchipInterpolator(knots, joints, axis=0)
     fine = np.concatenate(
-        [np.linspace(a, b, _FINE, endpoint=False) for a, b in itertools.pairwise(knots)]
+        [np.linspace(a, b, _SAMPLES, endpoint=False) for a, b in itertools.pairwise(knots)]
         + [knots[-1:]]
     )
     first, second = curve(fine, 1), curve(fine, 2)
-    pace = _paces(fine, first, second, limits, chain.speeds / _TO_SPEED_S)
+    pace = _paces(fine, first, second, limits, chain.speeds / _ACCELERATION_S)
     gaps = np.diff(fine)
     took = 2.0 * gaps / np.maximum(pace[:-1] + pace[1:], 1e-6)
     clock = np.concatenate([[0.0], np.cumsum(took)])
@@ -71,8 +74,8 @@ def time_parameterize(
     return TimedTrajectory(
         joints=curve(at),
         speeds=curve(at, 1) * rate[:, None],
-        place=np.interp(at, knots, np.arange(count)),
-        pace=paced,
+        waypoint=np.interp(at, knots, np.arange(count)),
+        feed_share=feed_share,
     )
 
 
@@ -83,7 +86,7 @@ def _paces(
     limits: np.ndarray,
     accelerations: np.ndarray,
 ) -> np.ndarray:
-    """The speed (m,) along a curve at places `fine` (m,), 1 where it is driven at its feed."""
+    """The speed (m,) along a curve at its parameters `fine` (m,), 1 where it is at its feed."""
     with np.errstate(divide="ignore"):
         most = np.minimum(1.0, (limits / np.abs(first)).min(axis=1))
         bend = np.sqrt((0.5 * accelerations / np.abs(second)).min(axis=1))

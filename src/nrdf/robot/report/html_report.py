@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.reports.html import duration_in_words, image_source, write_html
-from nrdf.robot.report.content import COLUMNS, figures
+from nrdf.robot.report.content import COLUMNS, metrics_row
 from nrdf.robot.report.pictures import COVERAGE, FILM, STILL
 
 
@@ -19,7 +19,7 @@ def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
         "report": report,
         "header": _header(report),
         "cards": _cards(report),
-        "columns": ["region", "process", *COLUMNS, "pieces", "collisions"],
+        "columns": ["region", "process", *COLUMNS, "joint paths", "collisions"],
         "cells": _cells,
         "still": image_source(folder / STILL),
         "film": image_source(folder / FILM),
@@ -33,13 +33,13 @@ def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
 def _header(report: Mapping[str, Any]) -> list[str]:
     place = report["placement"]
     base = " ".join(f"{x:.2f}" for x in place["base_m"])
-    turns = len(place["turns_used_rad"])
+    angles = len(place["turntable_used_rad"])
     return [
         report.get("date", ""),
         f"robot {report['robot']['name']}",
         f"base at {base} m from under the object, z up",
-        f"object {place['stand_m']:.2f} m above the floor, {turns} turns of the turntable",
-        place["object_lies"],
+        f"object {place['stand_m']:.2f} m above the floor, {angles} turntable angles",
+        place["object_pose"],
     ]
 
 
@@ -56,7 +56,7 @@ def _cards(report: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _cells(path: Mapping[str, Any]) -> list[str]:
-    return [*figures(path), str(path["pieces"]), str(len(path["collisions"]))]
+    return [*metrics_row(path), str(path["joint_paths"]), str(len(path["collisions"]))]
 
 
 def _not_reached(report: Mapping[str, Any]) -> list[str]:
@@ -68,11 +68,11 @@ def _not_reached(report: Mapping[str, Any]) -> list[str]:
 
 
 def _how_it_was_made(report: Mapping[str, Any]) -> list[str]:
-    turns = ", ".join(f"{np.degrees(t):.0f}°" for t in report["placement"]["turns_used_rad"])
+    angles = ", ".join(f"{np.degrees(t):.0f}°" for t in report["placement"]["turntable_used_rad"])
     command = [report["command"]] if "command" in report else []
     return [
         *report["robot"]["checked"],
         f"object: {report['object']}",
-        f"the turntable's turns: {turns}",
+        f"turntable angles: {angles}",
         *command,
     ]

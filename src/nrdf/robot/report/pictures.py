@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.io.atomic import write_atomically
 from nrdf.robot.model.mujoco_model import mujoco
-from nrdf.robot.simulation.execute import Log
+from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.robot.simulation.scene import cell_specification
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
 from nrdf.viz.palette import (
@@ -34,38 +35,40 @@ _SIZE, _FILM_SIZE = (1080, 810), (520, 400)
 _FRAMES, _FRAME_MS = 90, 120
 
 
-def draw(
+def draw_pictures(
     folder: Path,
-    simulated: SimulationResult,
+    result: SimulationResult,
     film: bool = True,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> str | None:
     """Write the pictures and the film; why there are none, where this machine cannot draw."""
     try:
-        studio = _Studio(simulated, "regions")
+        renderer = _CellRenderer(result, "regions")
     except Exception as error:  # whatever OpenGL raises
         return f"no pictures: this machine has no OpenGL that MuJoCo can draw with ({error})"
-    with studio:
+    with renderer:
         first = max(
-            simulated.paths, key=lambda driven: driven.path.tool_radius_m * _longest(driven)
+            result.paths, key=lambda simulated: simulated.path.tool_radius_m * _longest(simulated)
         )
         _save(
             folder / STILL,
-            studio.image(first, item := _busiest(first.logs), len(item.joints) // 2, *_SIZE),
+            renderer.image(first, item := _busiest(first.logs), len(item.joints) // 2, *_SIZE),
         )
         if film:
-            _film(folder / FILM, studio, simulated, progress)
-    with _Studio(simulated, "coverage") as studio:
-        images = [studio.object_image(angle, 720, 640) for angle in (-0.6, 2.4)]
+            _film(folder / FILM, renderer, result, progress)
+    with _CellRenderer(result, "coverage") as renderer:
+        images = [renderer.object_image(angle, 720, 640) for angle in (-0.6, 2.4)]
         _save(folder / COVERAGE, np.concatenate(images, axis=1))
     return None
 
 
-def _longest(driven: SimulatedPath) -> int:
-    return max((len(log.joints) for log in driven.logs if log.action.kind == "process"), default=0)
+def _longest(simulated: SimulatedPath) -> int:
+    return max(
+        (len(log.joints) for log in simulated.logs if log.action.kind == "process"), default=0
+    )
 
 
-def _busiest(logs: Sequence[Log]) -> Log:
+def _busiest(logs: Sequence[ExecutionLog]) -> ExecutionLog:
     return max(
         (item for item in logs if item.action.kind == "process"), key=lambda item: len(item.joints)
     )
@@ -81,21 +84,21 @@ def _save(path: Path, image: np.ndarray) -> None:
 
 def _film(
     path: Path,
-    studio: _Studio,
-    simulated: SimulationResult,
+    renderer: _CellRenderer,
+    result: SimulationResult,
     progress: Callable[[int, int], None],
 ) -> None:
     """Evenly through the whole time, faster than it was."""
     from PIL import Image
 
-    every = [(driven, item) for driven in simulated.paths for item in driven.logs]
+    every = [(simulated, item) for simulated in result.paths for item in simulated.logs]
     ends = np.cumsum([len(item.joints) for _, item in every])
     images = []
     for k, step in enumerate(np.linspace(0, ends[-1] - 1, _FRAMES).astype(int)):
         which = int(np.searchsorted(ends, step, side="right"))
-        driven, item = every[which]
+        simulated, item = every[which]
         at = int(step - (ends[which] - len(item.joints)))
-        images.append(Image.fromarray(studio.image(driven, item, at, *_FILM_SIZE)))
+        images.append(Image.fromarray(renderer.image(simulated, item, at, *_FILM_SIZE)))
         progress(k + 1, _FRAMES)
     film = io.BytesIO()
     images[0].save(
@@ -113,18 +116,18 @@ class _Drawn:
     object_id: int
 
 
-class _Studio:
+class _CellRenderer:
     """The cell with the object's mesh in the colours of its regions, or of what was covered."""
 
-    def __init__(self, simulated: SimulationResult, colours: str) -> None:
-        self.simulated = simulated
-        self._parts = _parts(simulated, colours)
+    def __init__(self, result: SimulationResult, colours: str) -> None:
+        self.result = result
+        self._parts = _parts(result, colours)
         self._drawn: dict[str, _Drawn] = {}
         self._renderers: dict[tuple[str, int, int], Any] = {}
         # Fails here, where it can be caught, if there is nothing to draw with.
-        self._renderer(simulated.paths[0], 64, 64)
+        self._renderer(result.paths[0], 64, 64)
 
-    def __enter__(self) -> _Studio:
+    def __enter__(self) -> _CellRenderer:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -132,13 +135,13 @@ class _Studio:
             renderer.close()
 
     def image(
-        self, driven: SimulatedPath, item: Log, at: int, width: int, height: int
+        self, simulated: SimulatedPath, item: ExecutionLog, at: int, width: int, height: int
     ) -> np.ndarray:
         """The cell (h, w, 3) at one step of an action, with the tool path on the object."""
-        drawn = self._model(driven)
-        pose = driven.cell.poses[item.action.turn]
+        drawn = self._model(simulated)
+        pose = simulated.cell.T_base_object[item.action.turntable_index]
         self._place(drawn, item.joints[at], pose)
-        renderer = self._renderer(driven, width, height)
+        renderer = self._renderer(simulated, width, height)
         camera = mujoco.MjvCamera()
         middle = 0.6 * (pose[:3, :3] @ self._middle() + pose[:3, 3])
         camera.lookat[:] = middle + np.array([0.0, 0.0, 0.1])
@@ -147,19 +150,19 @@ class _Studio:
         # Shadows cost half of the time, and a small picture does well without.
         shadows = width > _FILM_SIZE[0]
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        _add_lines(renderer.scene, driven, pose)
+        _add_lines(renderer.scene, simulated, pose)
         return np.asarray(renderer.render())
 
     def object_image(self, angle: float, width: int, height: int) -> np.ndarray:
         """The object alone (h, w, 3), from an angle about its upright axis."""
-        driven = self.simulated.paths[0]
-        drawn = self._model(driven)
-        pose = driven.cell.poses[0]
-        self._place(drawn, driven.logs[0].joints[0], pose)
-        renderer = self._renderer(driven, width, height)
+        simulated = self.result.paths[0]
+        drawn = self._model(simulated)
+        pose = simulated.cell.T_base_object[0]
+        self._place(drawn, simulated.logs[0].joints[0], pose)
+        renderer = self._renderer(simulated, width, height)
         camera = mujoco.MjvCamera()
         camera.lookat[:] = pose[:3, :3] @ self._middle() + pose[:3, 3]
-        size = float(np.linalg.norm(np.subtract(*self.simulated.distance_field.box)))
+        size = float(np.linalg.norm(np.subtract(*self.result.distance_field.box)))
         camera.distance, camera.elevation = 1.15 * size + 0.2, -20.0
         camera.azimuth = np.degrees(angle)
         option = mujoco.MjvOption()
@@ -169,36 +172,33 @@ class _Studio:
         return np.asarray(renderer.render())
 
     def _middle(self) -> np.ndarray:
-        low, high = self.simulated.distance_field.box
+        low, high = self.result.distance_field.box
         return np.asarray(0.5 * (low + high))
 
     def _place(self, drawn: _Drawn, joints: np.ndarray, pose: np.ndarray) -> None:
-        from scipy.spatial.transform import Rotation
-
         drawn.data.qpos[drawn.joints] = joints
         drawn.data.mocap_pos[drawn.object_id] = pose[:3, 3]
-        quaternion = Rotation.from_matrix(pose[:3, :3]).as_quat()
-        drawn.data.mocap_quat[drawn.object_id] = np.roll(quaternion, 1)
+        drawn.data.mocap_quat[drawn.object_id] = quaternions_wxyz(pose[:3, :3])
         mujoco.mj_forward(drawn.model, drawn.data)
 
-    def _model(self, driven: SimulatedPath) -> _Drawn:
-        key = f"{driven.path.tool} {driven.path.tool_radius_m}"
+    def _model(self, simulated: SimulatedPath) -> _Drawn:
+        key = f"{simulated.path.tool} {simulated.path.tool_radius_m}"
         if key not in self._drawn:
-            self._drawn[key] = _build(driven, self._parts)
+            self._drawn[key] = _build(simulated, self._parts)
         return self._drawn[key]
 
-    def _renderer(self, driven: SimulatedPath, width: int, height: int) -> Any:
-        key = (f"{driven.path.tool} {driven.path.tool_radius_m}", width, height)
+    def _renderer(self, simulated: SimulatedPath, width: int, height: int) -> Any:
+        key = (f"{simulated.path.tool} {simulated.path.tool_radius_m}", width, height)
         if key not in self._renderers:
-            model = self._model(driven).model
+            model = self._model(simulated).model
             self._renderers[key] = mujoco.Renderer(model, height, width, max_geom=4000)
         return self._renderers[key]
 
 
 def _build(
-    driven: SimulatedPath, parts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]
+    simulated: SimulatedPath, parts: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]
 ) -> _Drawn:
-    cell = driven.cell
+    cell = simulated.cell
     spec = cell_specification(cell)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1440, 1080
     spec.visual.headlight.ambient[:] = 0.42
@@ -236,27 +236,27 @@ def _build(
 
 
 def _parts(
-    simulated: SimulationResult, colours: str
+    result: SimulationResult, colours: str
 ) -> list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
     """The object's mesh cut by colour: vertices, faces and colour of each piece."""
-    distance_field, lesson = simulated.distance_field, simulated.simulation_job.bound_knowledge
-    points = lesson.cloud.points
+    distance_field, bound_knowledge = result.distance_field, result.simulation_job.bound_knowledge
+    points = bound_knowledge.cloud.points
     label = np.zeros(len(points), int)
     palette: list[tuple[float, ...]] = [NO_REGION]
     if colours == "regions":
-        inks = region_colours(list(lesson.regions))
-        for number, name in enumerate(lesson.regions, 1):
-            label[lesson.regions[name]] = number
+        inks = region_colours(list(bound_knowledge.regions))
+        for number, name in enumerate(bound_knowledge.regions, 1):
+            label[bound_knowledge.regions[name]] = number
             palette.append(tuple(0.55 * inks[name] + 0.45))
     else:
         palette += [COVERED, NOT_COVERED, LEFT_OUT]
-        for driven in simulated.paths:
-            out = driven.metrics
-            found = np.where(out.worked, 1, np.where(out.wanted, 2, 3))
-            region = lesson.regions[driven.path.region]
-            nearest = cKDTree(points[out.region_points]).query(points[region])[1]
+        for simulated in result.paths:
+            metrics = simulated.metrics
+            found = np.where(metrics.worked, 1, np.where(metrics.wanted, 2, 3))
+            region = bound_knowledge.regions[simulated.path.region]
+            nearest = cKDTree(points[metrics.region_points]).query(points[region])[1]
             label[region] = found[nearest]
-    normals = lesson.cloud.normals
+    normals = bound_knowledge.cloud.normals
     corners = distance_field.vertices[distance_field.faces]
     middle = corners.mean(axis=1)
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -276,11 +276,11 @@ def _parts(
     return made
 
 
-def _add_lines(scene: Any, driven: SimulatedPath, pose: np.ndarray) -> None:
-    """The path's lines, dark where they are driven, red where not."""
-    for line, verdict in zip(driven.lines, driven.metrics.verdicts, strict=True):
-        height = driven.process.standoff_m
-        places = line.positions + (height - 0.002) * line.axes
+def _add_lines(scene: Any, simulated: SimulatedPath, pose: np.ndarray) -> None:
+    """The path's lines, dark where they are simulated, red where not."""
+    for group, verdict in zip(simulated.path.groups, simulated.metrics.verdicts, strict=True):
+        height = simulated.strategy.standoff_m
+        places = group.process.positions + (height - 0.002) * group.process.axes
         places = places @ pose[:3, :3].T + pose[:3, 3]
         for k in range(len(places) - 1):
             if scene.ngeom >= scene.maxgeom:

@@ -1,4 +1,4 @@
-"""The job, driven in simulation: a force controller along the tool's axis, and what it feels.
+"""Execute actions in simulation: a force controller along the tool's axis, and what it measures.
 
 The arm is MuJoCo's, with its inertia, motors and force sensor. The surface pushes on the tool's
 soft pad as a spring and damper along the tool's axis, with friction against the travel, where the
@@ -6,7 +6,7 @@ object's smooth surface really is: a shifted object is met where it has been shi
 controller is an admittance: it moves the tool along its axis at a speed in proportion to the error
 of the force that the sensor measures (Siciliano et al., Robotics, 2009, chapter 9). How far the pad
 reaches between waypoints and over bends is known from the scan, and fed forward; where the object
-is not where it was scanned, that is wrong, and the force alone tells.
+is not where it was scanned, that is wrong, and only the force corrects it.
 """
 
 from __future__ import annotations
@@ -19,38 +19,38 @@ import numpy as np
 
 from nrdf.geometry.polylines import step_lengths, summed
 from nrdf.robot.model.cell import Cell
-from nrdf.robot.model.tool import PAD_GIVES_M
+from nrdf.robot.model.tool import PAD_GIVE_M
 from nrdf.robot.planning.program import Action
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.scene import SimulatedArm
 from nrdf.surface.surface import Surface
 
-SETTLED_SHARE, SETTLES_S = 0.1, 1.5
-"""The tool waits at a line's beginning until the force is that close, for at most that long."""
+SETTLED_SHARE, SETTLING_S = 0.1, 1.5
+"""The tool waits at a line's start until the force is that close, for at most that long."""
 _RESPONSE_S = 0.035  # of the force controller
 _FASTEST_M_S = 0.05  # of its correction
 _FARTHEST_M = 0.012
 _EXPECTED_M = 0.004  # between plan and scan
 _DAMPING_S = 0.004  # of the pad, as a share of its stiffness
 _FRICTION = 0.2
-_ASKED_M, _ASKED_RAD = 0.003, np.radians(4.0)  # between places where the surface is looked for
-_LOST_M = 0.02  # a surface farther from the plan than this is none
+_SAMPLE_M, _SAMPLE_RAD = 0.003, np.radians(4.0)  # between samples of the surface
+_LOST_M = 0.02  # a surface farther from the plan than this does not count
 _FLATTEST = 0.3  # least cosine between the tool's axis and the surface's inward normal
 
 
 @dataclass(frozen=True)
-class Log:
-    """What happened during one action, a row a step.
+class ExecutionLog:
+    """What happened during one action, a row for each step.
 
-    joints: (t, n). place: (t,), between the stroke's waypoints. working: (t,), false while the tool
-    waits for its force or dwells. force_n: (t,) that the sensor feels; tip: (t, 3) in the object's
-    planned frame; off_m: (t,) of the tip from the commanded place, the correction along the axis
-    left out.
+    joints: (t, n). waypoint: (t,), a number between the joint path's waypoints. working: (t,),
+    false while the tool waits for its force or dwells. force_n: (t,) that the sensor measures. tip,
+    axis: (t, 3) of the tool in the object's planned frame. off_m: (t,) of the tip from where it is
+    commanded to be, without the correction along the axis.
     """
 
     action: Action
     joints: np.ndarray
-    place: np.ndarray
+    waypoint: np.ndarray
     working: np.ndarray
     force_n: np.ndarray
     tip: np.ndarray
@@ -63,14 +63,17 @@ def execute(
     actions: Sequence[Action],
     surface: Surface,
     shift_m: np.ndarray,
-    known: Mapping[int, Log] = MappingProxyType({}),
-) -> list[Log]:
-    """Drive actions in simulation; shift_m: (3,) by which the object is off its place, in its
-    own frame. known: logs of actions, by the action's id, that need not be driven again: each
-    action begins at rest, where the one before it ends."""
+    known: Mapping[int, ExecutionLog] = MappingProxyType({}),
+) -> list[ExecutionLog]:
+    """Execute actions in simulation.
+
+    shift_m: (3,) by which the object is shifted, in its own frame. known: logs of actions, by the
+    action's id, that need not be executed again: each action begins at rest, where the one before
+    it ends.
+    """
     if not actions:
         return []
-    machine = SimulatedArm(cell, actions[0].timed.joints[0])
+    arm = SimulatedArm(cell, actions[0].timed.joints[0])
     logs = []
     offset, there = 0.0, True
     for action in actions:
@@ -79,30 +82,30 @@ def execute(
             there = False
             continue
         if not there:
-            machine.start(action.timed.joints[0])
+            arm.start(action.timed.joints[0])
             offset, there = 0.0, True
         if action.kind == "process" and action.force_n is not None:
-            log, offset = _press(machine, cell, action, surface, shift_m)
+            log, offset = _press(arm, cell, action, surface, shift_m)
         else:
-            log, offset = _move(machine, cell, action, offset)
+            log, offset = _move(arm, cell, action, offset)
         logs.append(log)
     return logs
 
 
 @dataclass(frozen=True)
-class _Plan:
-    """An action at each step: joints, speeds, accelerations (t, n), the tool's places and axes
+class _Motion:
+    """An action at each step: joints, speeds, accelerations (t, n), the tool's positions and axes
     (t, 3) in the base's frame, and the joints' motion for a shift along the axis, (t, n)."""
 
     joints: np.ndarray
     speeds: np.ndarray
     accelerations: np.ndarray
-    places: np.ndarray
+    positions: np.ndarray
     axes: np.ndarray
     along: np.ndarray
 
     @staticmethod
-    def of(cell: Cell, action: Action) -> _Plan:
+    def of(cell: Cell, action: Action) -> _Motion:
         joints, speeds = action.timed.joints, action.timed.speeds
         frames = cell.chain.frames(joints)
         moved, turned = frames.jacobian()
@@ -112,99 +115,102 @@ class _Plan:
         square = both @ np.swapaxes(both, 1, 2) + 1e-6 * np.eye(6)
         along = np.einsum("tin,ti->tn", both, np.linalg.solve(square, wanted[..., None])[..., 0])
         accelerations = np.gradient(speeds, STEP_S, axis=0) if len(speeds) > 1 else 0.0 * speeds
-        return _Plan(joints, speeds, accelerations, frames.tcp, axis, along)
+        return _Motion(joints, speeds, accelerations, frames.tcp, axis, along)
 
 
 class _Record:
-    def __init__(self, machine: SimulatedArm, steps: int) -> None:
-        size = len(machine.joints)
+    def __init__(self, arm: SimulatedArm, steps: int) -> None:
+        size = len(arm.joints)
         self.joints = np.zeros((steps, size))
         self.tip, self.axis = np.zeros((steps, 3)), np.zeros((steps, 3))
-        self.force, self.off, self.place = np.zeros(steps), np.zeros(steps), np.zeros(steps)
+        self.force, self.off, self.waypoint = np.zeros(steps), np.zeros(steps), np.zeros(steps)
         self.working = np.zeros(steps, bool)
         self.count = 0
 
     def add(
         self,
-        machine: SimulatedArm,
+        arm: SimulatedArm,
         tip: np.ndarray,
         axis: np.ndarray,
         force: float,
         off: float,
-        place: float,
+        waypoint: float,
         working: bool,
     ) -> None:
         i = self.count
-        self.joints[i], self.tip[i], self.axis[i] = machine.joints, tip, axis
-        self.force[i], self.off[i], self.place[i], self.working[i] = force, off, place, working
+        self.joints[i], self.tip[i], self.axis[i] = arm.joints, tip, axis
+        self.force[i], self.off[i] = force, off
+        self.waypoint[i], self.working[i] = waypoint, working
         self.count += 1
 
-    def log(self, cell: Cell, action: Action) -> Log:
+    def log(self, cell: Cell, action: Action) -> ExecutionLog:
         kept = slice(0, self.count)
-        pose = cell.poses[action.turn]
+        pose = cell.T_base_object[action.turntable_index]
         tip = (self.tip[kept] - pose[:3, 3]) @ pose[:3, :3]
-        return Log(
-            action, self.joints[kept], self.place[kept], self.working[kept], self.force[kept],
+        return ExecutionLog(
+            action, self.joints[kept], self.waypoint[kept], self.working[kept], self.force[kept],
             tip, self.axis[kept] @ pose[:3, :3], self.off[kept],
         )  # fmt: skip
 
 
-def _move(machine: SimulatedArm, cell: Cell, action: Action, offset: float) -> tuple[Log, float]:
-    """An action without force; the correction of the line before is taken back on the way."""
-    plan = _Plan.of(cell, action)
-    count = len(plan.joints)
+def _move(
+    arm: SimulatedArm, cell: Cell, action: Action, offset: float
+) -> tuple[ExecutionLog, float]:
+    """An action without force; the correction of the line before is taken back meanwhile."""
+    motion = _Motion.of(cell, action)
+    count = len(motion.joints)
     waits = round(action.dwell_s / STEP_S)
-    record = _Record(machine, count + waits)
-    tip, axis = machine.tip()
+    record = _Record(arm, count + waits)
+    tip, axis = arm.tip()
     for i in [*range(count), *([count - 1] * waits)]:
         offset *= 0.97
-        machine.step(
-            plan.joints[i] + offset * plan.along[i],
-            plan.speeds[i],
-            plan.accelerations[i],
+        arm.step(
+            motion.joints[i] + offset * motion.along[i],
+            motion.speeds[i],
+            motion.accelerations[i],
             None,
             tip,
         )
-        tip, axis = machine.tip()
-        away = tip - plan.places[i]
-        away = away - (away @ plan.axes[i]) * plan.axes[i] if offset else away
+        tip, axis = arm.tip()
+        away = tip - motion.positions[i]
+        away = away - (away @ motion.axes[i]) * motion.axes[i] if offset else away
         working = action.kind == "process"
         record.add(
-            machine, tip, axis, 0.0, float(np.sqrt(away @ away)), action.timed.place[i], working
+            arm, tip, axis, 0.0, float(np.sqrt(away @ away)), action.timed.waypoint[i], working
         )
     return record.log(cell, action), 0.0 if abs(offset) < 1e-5 else offset
 
 
 def _press(
-    machine: SimulatedArm,
+    arm: SimulatedArm,
     cell: Cell,
     action: Action,
     surface: Surface,
     shift_m: np.ndarray,
-) -> tuple[Log, float]:
-    """A stroke under force; its log, and how far along its axis the tool was off at the end."""
-    plan = _Plan.of(cell, action)
-    count = len(plan.joints)
+) -> tuple[ExecutionLog, float]:
+    """A joint path under force; its log, and how far along its axis the tool was off at the end."""
+    motion = _Motion.of(cell, action)
+    count = len(motion.joints)
     wanted = float(action.force_n or 0.0)
-    stiffness = max(wanted, 1.0) / PAD_GIVES_M
-    gap = _gaps(plan, cell, action, surface, shift_m)
-    planned_gap = gap if not shift_m.any() else _gaps(plan, cell, action, surface, 0.0 * shift_m)
+    stiffness = max(wanted, 1.0) / PAD_GIVE_M
+    gap = _gaps(motion, cell, action, surface, shift_m)
+    planned_gap = gap if not shift_m.any() else _gaps(motion, cell, action, surface, 0.0 * shift_m)
     expected = _expected(planned_gap)
     rising = np.gradient(expected, STEP_S) if count > 1 else 0.0 * expected
-    travel = np.gradient(plan.places, axis=0) if count > 1 else np.zeros((1, 3))
+    travel = np.gradient(motion.positions, axis=0) if count > 1 else np.zeros((1, 3))
     travel /= np.maximum(np.linalg.norm(travel, axis=1, keepdims=True), 1e-9)
     gain = STEP_S / (_RESPONSE_S * stiffness)
     most = _FASTEST_M_S * STEP_S
-    settling, dwelling = round(SETTLES_S / STEP_S), round(action.dwell_s / STEP_S)
-    record = _Record(machine, count + settling + dwelling)
-    # The correction is what the scan lets expect, and what the force asks for beyond it.
+    settling, dwelling = round(SETTLING_S / STEP_S), round(action.dwell_s / STEP_S)
+    record = _Record(arm, count + settling + dwelling)
+    # The correction is what the scan predicts, and what the force asks for beyond it.
     asked, before, steady, i, waited, dwelt = -float(expected[0]), 0.0, 0, 0, 0, 0
     working = False
-    tip, axis = machine.tip()
-    still = np.zeros(plan.joints.shape[1])
+    tip, axis = arm.tip()
+    still = np.zeros(motion.joints.shape[1])
     while True:
-        planned = plan.axes[i]
-        away = tip - plan.places[i]
+        planned = motion.axes[i]
+        away = tip - motion.positions[i]
         depth = float(away @ planned)
         # The spring between the surface and where the pad's face really is.
         sunk = depth - gap[i]
@@ -216,20 +222,20 @@ def _press(
             pushed = -push * planned - (_FRICTION * push if working else 0.0) * travel[i]
         moving = working and i < count - 1
         offset = expected[i] + asked
-        machine.step(
-            plan.joints[i] + offset * plan.along[i],
-            plan.speeds[i] + rising[i] * plan.along[i] if moving else still,
-            plan.accelerations[i] if moving else still,
+        arm.step(
+            motion.joints[i] + offset * motion.along[i],
+            motion.speeds[i] + rising[i] * motion.along[i] if moving else still,
+            motion.accelerations[i] if moving else still,
             pushed,
             tip,
         )
-        tip, axis = machine.tip()
-        force = machine.force(axis)
+        tip, axis = arm.tip()
+        force = arm.force(axis)
         asked += min(max(gain * (wanted - force), -most), most)
         asked = min(max(asked, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
         aside = away - depth * planned
         record.add(
-            machine, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.place[i], moving
+            arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i], moving
         )
         if not working:
             waited += 1
@@ -253,31 +259,33 @@ def _expected(gap: np.ndarray) -> np.ndarray:
 
 
 def _gaps(
-    plan: _Plan, cell: Cell, action: Action, surface: Surface, shift_m: np.ndarray
+    motion: _Motion, cell: Cell, action: Action, surface: Surface, shift_m: np.ndarray
 ) -> np.ndarray:
     """How far (t,) the shifted object's surface is along the tool's axis from the planned tool."""
-    moved, turned = step_lengths(plan.places), step_lengths(plan.axes)
-    walked = summed(moved + _ASKED_M / _ASKED_RAD * turned)
-    asked = np.unique(np.floor(walked / _ASKED_M).astype(int), return_index=True)[1]
-    asked = np.union1d(asked, [len(walked) - 1])
-    pose = cell.poses[action.turn]
-    positions = (plan.places[asked] - pose[:3, 3]) @ pose[:3, :3]
-    axes = plan.axes[asked] @ pose[:3, :3]
+    moved, turned = step_lengths(motion.positions), step_lengths(motion.axes)
+    walked = summed(moved + _SAMPLE_M / _SAMPLE_RAD * turned)
+    samples = np.unique(np.floor(walked / _SAMPLE_M).astype(int), return_index=True)[1]
+    samples = np.union1d(samples, [len(walked) - 1])
+    pose = cell.T_base_object[action.turntable_index]
+    positions = (motion.positions[samples] - pose[:3, 3]) @ pose[:3, :3]
+    axes = motion.axes[samples] @ pose[:3, :3]
     found = heights(positions, axes, surface, shift_m)
-    felt = _felt(positions, axes, found, cell.tool.radius_m)
-    return np.interp(np.arange(len(walked)), asked, felt)
+    averaged = _pad_heights(positions, axes, found, cell.tool.radius_m)
+    return np.interp(np.arange(len(walked)), samples, averaged)
 
 
-def _felt(positions: np.ndarray, axes: np.ndarray, found: np.ndarray, radius: float) -> np.ndarray:
-    """Heights (m,) as a soft round pad feels them: over its width along the way, on average."""
+def _pad_heights(
+    positions: np.ndarray, axes: np.ndarray, found: np.ndarray, radius: float
+) -> np.ndarray:
+    """Heights (m,) averaged over a soft round pad's width along the path."""
     there = found < _LOST_M
     touched = positions + np.where(there, found, 0.0)[:, None] * axes
     offset = touched[None] - positions[:, None]
     along = np.einsum("mka,ma->mk", offset, axes)
     aside = np.sqrt(np.maximum(np.einsum("mka,mka->mk", offset, offset) - along**2, 0.0))
-    # A line that passes by again a stroke later is not under the pad for it.
+    # A part of the path that passes by again later is not under the pad.
     order = np.abs(np.subtract.outer(np.arange(len(found)), np.arange(len(found))))
-    near = (order <= 2.0 * radius / _ASKED_M) & (aside < radius) & (np.abs(along) < _LOST_M)
+    near = (order <= 2.0 * radius / _SAMPLE_M) & (aside < radius) & (np.abs(along) < _LOST_M)
     weight = np.where(near & there, np.sqrt(np.maximum(1.0 - (aside / radius) ** 2, 0.0)), 0.0)
     total = weight.sum(axis=1)
     mean = (weight * along).sum(axis=1) / np.maximum(total, 1e-9)
@@ -288,10 +296,10 @@ def heights(
     positions: np.ndarray, axes: np.ndarray, surface: Surface, shift_m: np.ndarray
 ) -> np.ndarray:
     """How far (m,) along axes (m, 3) from positions (m, 3) the object's surface is, when it is
-    shifted, all in its planned frame; far away where there is none."""
-    places, normals, off = surface.nearest(positions - shift_m, -axes)
+    shifted, all in its planned frame; 1 m where there is none."""
+    points, normals, off = surface.nearest(positions - shift_m, -axes)
     facing = -np.einsum("na,na->n", axes, normals)
-    along = -np.einsum("na,na->n", places + shift_m - positions, normals)
+    along = -np.einsum("na,na->n", points + shift_m - positions, normals)
     found = along / np.maximum(facing, _FLATTEST)
     lost = ~np.isfinite(off) | (facing < _FLATTEST) | (np.abs(found) > _LOST_M)
     return np.where(lost, 1.0, found)

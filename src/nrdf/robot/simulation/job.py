@@ -10,28 +10,28 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.geometry.similarity import up_axis
 from nrdf.process.bound_knowledge import BoundKnowledge, read_bound_knowledge
-from nrdf.process.knowledge import Process
 from nrdf.reports.job_folder import KNOWLEDGE
 from nrdf.robot.model.cell import upright_rotation
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.file import read_toolpaths
+from nrdf.toolpath.file import FILE, read_toolpaths
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Job, ToolPath
 
-_FARTHEST_M = 0.05  # that a waypoint may be from the object, beyond the process's stand-off
+_FARTHEST_M = 0.05  # that a waypoint may be from the object, beyond the stand-off
 
 
 @dataclass(frozen=True)
 class SimulationJob:
     """A job with the object that it is for.
 
-    bound_knowledge: the job's own knowledge: the target in metres with its regions. processes: of
-    each of the job's paths. upright: (3, 3), from the target's frame to one with z up and x where
-    the object faces; origin: where that is from, in words; assumed: whether nothing says it.
+    bound_knowledge: the job's own knowledge: the target in metres with its regions. strategies:
+    of each of the job's paths. upright: (3, 3), from the target's frame to one with z up and x
+    where the object faces; origin: where that is from, in words; assumed: whether nothing says it.
     """
 
     job: Job
     bound_knowledge: BoundKnowledge
-    processes: tuple[Process, ...]
+    strategies: tuple[Strategy, ...]
     upright: np.ndarray
     origin: str
     assumed: bool = False
@@ -54,8 +54,8 @@ def read_simulation_job(folder: str | Path, up: str | None = None) -> Simulation
 
     up: an axis of the job's frame ("x" to "-z"), or "x y z", instead of what the job says.
 
-    Raises ProcessError where it is no such folder, or where its tool paths and its object do not
-    fit each other: another frame or unit.
+    Raises ProcessError where it is no such folder, where a tool path does not have the strategy
+    that made it, and where tool paths and object do not fit each other: another frame or unit.
     """
     folder = Path(folder)
     job = read_toolpaths(folder)
@@ -77,24 +77,22 @@ def read_simulation_job(folder: str | Path, up: str | None = None) -> Simulation
         )
     if bound_knowledge.cloud.normals is None:
         raise ProcessError(f"the job's {bound_knowledge.knowledge.reference.cloud} has no normals")
-    processes = tuple(_process(bound_knowledge, path) for path in job.paths)
-    made = SimulationJob(job, bound_knowledge, processes, *_orientation(job, up))
+    strategies = tuple(_strategy(bound_knowledge, path) for path in job.paths)
+    made = SimulationJob(job, bound_knowledge, strategies, *_orientation(job, up))
     _check_frame(made)
     return made
 
 
-def _process(bound_knowledge: BoundKnowledge, path: ToolPath) -> Process:
-    regions = [region for region in bound_knowledge.knowledge.regions if region.name == path.region]
-    made = [p for region in regions for p in region.processes if p.label == path.process]
-    if len(made) == 1:
-        return made[0]
+def _strategy(bound_knowledge: BoundKnowledge, path: ToolPath) -> Strategy:
     what = f"the job's tool path '{path.process}' on '{path.region}'"
-    if made:  # an early job: since then each has a label of its own
+    if path.region not in bound_knowledge.regions:
+        raise ProcessError(f"{what}: its {KNOWLEDGE} has no such region; transfer it again")
+    if path.strategy is None:
         raise ProcessError(
-            f"{what} may be of {len(made)} processes of that name in its {KNOWLEDGE}; transfer it "
-            "again, or name each of them"
+            f"{what} has no strategy in its {FILE}, as an earlier nrdf wrote it: the simulation "
+            "cannot tell what was to be worked; transfer it again"
         )
-    raise ProcessError(f"{what} is not in its {KNOWLEDGE}; transfer it again")
+    return path.strategy
 
 
 def _orientation(job: Job, up: str | None) -> tuple[np.ndarray, str, bool]:
@@ -111,11 +109,11 @@ def _orientation(job: Job, up: str | None) -> tuple[np.ndarray, str, bool]:
 def _check_frame(simulation_job: SimulationJob) -> None:
     """Raise ProcessError where the tool paths are not on the object."""
     surface = Surface(simulation_job.points, simulation_job.normals)
-    for path, process in zip(simulation_job.job.paths, simulation_job.processes, strict=True):
+    for path, strategy in zip(simulation_job.job.paths, simulation_job.strategies, strict=True):
         positions = [s.positions for s in path.segments if s.kind == "process"]
         if not positions:
             raise ProcessError(f"the tool path on '{path.region}' has no process segment")
-        distance = surface.tree.query(np.concatenate(positions))[0] - process.standoff_m
+        distance = surface.tree.query(np.concatenate(positions))[0] - strategy.standoff_m
         typical = float(np.median(distance))
         if typical > _FARTHEST_M:
             size = float(np.ptp(simulation_job.points, axis=0).max())

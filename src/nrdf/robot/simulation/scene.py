@@ -28,7 +28,7 @@ def cell_specification(cell: Cell) -> Any:
     spec = cell.arm.spec.copy()
     spec.option.timestep = STEP_S
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # Collisions are looked for, at every step, against the object's distance field instead.
+    # Collisions are checked at every step against the object's distance field instead.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     spec.compiler.boundmass, spec.compiler.boundinertia = 0.05, 1e-4
     for body in spec.bodies[1:]:
@@ -75,7 +75,7 @@ def _add_motors(spec: Any, cell: Cell) -> None:
 
 
 class SimulatedArm:
-    """The simulated arm: commanded joints in, true joints and the sensor's force out."""
+    """The arm in MuJoCo: commanded joints in, true joints and the sensor's force out."""
 
     def __init__(self, cell: Cell, start: np.ndarray) -> None:
         self.cell = cell
@@ -103,17 +103,18 @@ class SimulatedArm:
 
     @property
     def joints(self) -> np.ndarray:
+        """The true joints (n,)."""
         return np.asarray(self.data.qpos[self._position])
 
     def tip(self) -> tuple[np.ndarray, np.ndarray]:
         """The tool centre point and the tool's axis (3,), in the base's frame."""
-        turned = self.data.xmat[self._tool].reshape(3, 3)
-        return self.data.xpos[self._tool] + turned @ self._tip, turned @ self._axis
+        rotation = self.data.xmat[self._tool].reshape(3, 3)
+        return self.data.xpos[self._tool] + rotation @ self._tip, rotation @ self._axis
 
     def force(self, axis: np.ndarray) -> float:
-        """What the sensor feels along the tool's axis (3,), N, the tool's weight taken off."""
-        turned = self.data.site_xmat[self._site].reshape(3, 3)
-        return float(axis @ (turned @ self.data.sensordata[:3] - self._weight))
+        """What the sensor measures along the tool's axis (3,), N, without the tool's weight."""
+        rotation = self.data.site_xmat[self._site].reshape(3, 3)
+        return float(axis @ (rotation @ self.data.sensordata[:3] - self._weight))
 
     def step(
         self,

@@ -1,8 +1,7 @@
-"""A job on an arm, from reach to coverage: what `nrdf simulate` does before it writes."""
+"""A job on an arm, from placement to metrics: what `nrdf simulate` does before it writes."""
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,47 +9,52 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import RobotError
-from nrdf.process.knowledge import Process
 from nrdf.robot.model.arm import Arm
 from nrdf.robot.model.cell import Cell, Placement
 from nrdf.robot.model.signed_distance import SignedDistanceField, distance_field_from_points
 from nrdf.robot.model.tool import tool_of
-from nrdf.robot.planning.follow import follow
-from nrdf.robot.planning.inverse_kinematics import Library
-from nrdf.robot.planning.lines import Line, lines_of
+from nrdf.robot.planning.inverse_kinematics import SeedLibrary
+from nrdf.robot.planning.joint_path_planner import plan_joint_paths
 from nrdf.robot.planning.placement import find_placement
 from nrdf.robot.planning.program import PathProgram, find_home
 from nrdf.robot.simulation.collision import Collision
-from nrdf.robot.simulation.collision_free import drive
-from nrdf.robot.simulation.execute import Log
+from nrdf.robot.simulation.collision_rejection import run
+from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.robot.simulation.job import SimulationJob
 from nrdf.robot.simulation.metrics import PathMetrics, measure_path
 from nrdf.surface.surface import Surface
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import ToolPath
-
-log = logging.getLogger(__name__)
 
 LIBRARY_SIZE = 40_000
 
 
 @dataclass(frozen=True)
 class SimulatedPath:
-    """One tool path on the arm. collisions, avoided: as a `Drive` has them."""
+    """One tool path on the arm. collisions, rejected: as a `PathRun` has them."""
 
     path: ToolPath
-    process: Process
+    strategy: Strategy
     cell: Cell
-    lines: tuple[Line, ...]
     program: PathProgram
-    logs: tuple[Log, ...]
+    logs: tuple[ExecutionLog, ...]
     collisions: tuple[Collision, ...]
-    avoided: tuple[Collision, ...]
+    rejected: tuple[Collision, ...]
     metrics: PathMetrics
+
+    def line(self, log: ExecutionLog) -> int:
+        """The number of the line that a log's action is on; -1 between lines."""
+        group = log.action.group
+        return self.path.groups[group].process.line if group >= 0 else -1
 
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """A job, driven. seconds: of processor time by phase; shift_m: of the object off its place."""
+    """A job, simulated.
+
+    reachable: share of a sample of waypoints that the placement reaches. shift_m: (3,) by which the
+    object was shifted. seconds: of processor time by phase.
+    """
 
     simulation_job: SimulationJob
     arm: Arm
@@ -67,15 +71,16 @@ def simulate(
     arm: Arm,
     distance_field: SignedDistanceField | None = None,
     placement: Placement | None = None,
-    turns: int = 12,
+    turntable_positions: int = 12,
     shift_m: Sequence[float] = (0.0, 0.0, 0.0),
     seed: int = 0,
     progress: Callable[[str], None] = lambda what: None,
 ) -> SimulationResult:
-    """Drive a job on an arm, in simulation.
+    """Simulate a job on an arm.
 
-    distance_field: the object's shape, from its points unless given; placement: searched for unless
-    given, with the object at any of `turns` turns. Raises RobotError where nothing can be reached.
+    distance_field: of the object, from its points unless given; placement: searched for unless
+    given, with the turntable at any of `turntable_positions` angles. Raises RobotError where
+    nothing can be reached.
     """
     rng = np.random.default_rng(seed)
     clock = _Clock()
@@ -85,9 +90,9 @@ def simulate(
         distance_field = distance_field_from_points(simulation_job.points, simulation_job.normals)
     clock("shape")
     progress("placement")
-    every = [(path, lines_of(path)) for path in simulation_job.job.paths]
+    upright, paths = simulation_job.upright, simulation_job.job.paths
     placement, reachable = find_placement(
-        arm, every, distance_field, simulation_job.upright, placement, turns, rng
+        arm, paths, distance_field, upright, placement, turntable_positions, rng
     )
     if reachable == 0.0:
         raise RobotError(
@@ -96,48 +101,39 @@ def simulate(
             "turn (--turns), or take --base auto"
         )
     clock("placement")
-    paths = []
+    simulated = []
     home: np.ndarray | None = None
-    library: Library | None = None
-    for path, process in zip(simulation_job.job.paths, simulation_job.processes, strict=True):
+    library: SeedLibrary | None = None
+    shift = np.asarray(shift_m, float)
+    for path, strategy in zip(paths, simulation_job.strategies, strict=True):
         where = f"{path.region}, {path.process}"
         progress(f"{where}: inverse kinematics")
-        cell = Cell.build(arm, tool_of(path), distance_field, placement, simulation_job.upright)
+        cell = Cell.build(arm, tool_of(path), distance_field, placement, upright)
         if library is None or not np.array_equal(library.T_flange_tcp, cell.tool.T_flange_tcp):
-            library = Library.build(cell, LIBRARY_SIZE, rng)
-        lines = lines_of(path)
-        strokes, covered, why = follow(cell, library, lines)
+            library = SeedLibrary.build(cell, LIBRARY_SIZE, rng)
+        joint_paths, covered, reachability = plan_joint_paths(cell, library, path.groups)
         clock("inverse kinematics")
         home = find_home(cell, library) if home is None else home
         progress(f"{where}: simulation")
-        done = drive(
-            cell, path.region, lines, strokes, home, library, rng, surface,
-            np.asarray(shift_m, float), clock,
-        )  # fmt: skip
+        done = run(
+            cell, path.region, path.groups, joint_paths, home, library, rng, surface, shift, clock
+        )
+        region = simulation_job.bound_knowledge.regions[path.region]
         metrics = measure_path(
-            simulation_job.bound_knowledge,
-            surface,
-            path,
-            process,
-            cell,
-            lines,
-            done.program,
-            covered,
-            why,
-            done.logs,
+            region, surface, path, strategy, cell, done.program, covered, reachability, done.logs
         )
         clock("metrics")
-        paths.append(
+        simulated.append(
             SimulatedPath(
-                path, process, cell, lines, done.program, done.logs, done.collisions,
-                done.avoided, metrics,
+                path, strategy, cell, done.program, done.logs, done.collisions, done.rejected,
+                metrics,
             )
         )  # fmt: skip
-    if not any(p.metrics.reached for p in paths):
+    if not any(p.metrics.reached for p in simulated):
         raise RobotError(f"the arm '{arm.name}' can drive none of the job's lines")
     return SimulationResult(
-        simulation_job, arm, distance_field, placement, reachable, tuple(paths),
-        np.asarray(shift_m, float), clock.seconds,
+        simulation_job, arm, distance_field, placement, reachable, tuple(simulated), shift,
+        clock.seconds,
     )  # fmt: skip
 
 

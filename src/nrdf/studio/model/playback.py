@@ -11,11 +11,11 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.frames import quaternions_wxyz
-from nrdf.robot.model.cell import COLUMN_M
+from nrdf.robot.model.cell import COLUMN_RADIUS_M
 from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.report.content import simulation_report
-from nrdf.robot.report.trajectories import rows
+from nrdf.robot.report.trajectories import written_steps
 from nrdf.robot.simulation.scene import cell_specification
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ class Playback:
     """A job on an arm, in the cell's frame (`nrdf.robot.model.cell.Placement`), about every 40 ms.
 
     times: (t,), s, and what is at each: path (t,), the number of the tool path; doing: (t,) as
-    `nrdf.robot.planning.program.Kind`; line (t,), -1 where none is driven; force_n (t,); turn_rad
-    (t,), of the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies.
+    `nrdf.robot.planning.program.ActionKind`; line (t,), -1 where none is driven; force_n (t,);
+    turn_rad (t,), of the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies.
     T_cell_object: (4, 4), of the object at turn 0. missed: (k, 3), waypoints that are not reached,
     in the object's frame, m. report: what report.json says.
     """
@@ -88,13 +88,13 @@ def playback_of(simulated: SimulationResult) -> Playback:
         shapes += [shape for shape in made if number == 0 or shape.path == number]
         mover = _Mover(model, driven, simulated.placement.T_cell_base())
         for log in driven.logs:
-            kept = rows(log)
+            kept = written_steps(log)
             count = len(kept)
             positions, quaternions = mover(log.joints[kept])
-            angle = driven.cell.turns_rad[log.action.turn]
+            angle = driven.cell.turntable_rad[log.action.turntable_index]
             turn = angle if turn is None else turn
             step = (angle - turn + np.pi) % (2 * np.pi) - np.pi
-            line = driven.lines[log.action.line].number if log.action.line >= 0 else -1
+            line = driven.line(log)
             added = {
                 "times": clock + kept * STEP_S,
                 "path": np.full(count, number),
@@ -196,7 +196,7 @@ def _standing(simulated: SimulationResult) -> list[Shape]:
     place = simulated.placement
     x, y, z = place.base_m
     stand, (radius, height) = place.stand_m, _TABLE_M
-    pieces = [((x, y), 0.0, z, COLUMN_M), ((0.0, 0.0), stand - height, stand, radius)]
+    pieces = [((x, y), 0.0, z, COLUMN_RADIUS_M), ((0.0, 0.0), stand - height, stand, radius)]
     pieces.append(((0.0, 0.0), 0.0, stand - height, 0.3 * radius))
     made = []
     for (px, py), low, high, wide in pieces:
@@ -214,16 +214,16 @@ def _upright(simulated: SimulationResult) -> np.ndarray:
     place = simulated.placement
     poses = place.T_cell_object(simulated.distance_field, simulated.simulation_job.upright)
     back = np.eye(4)
-    back[:3, :3] = Rotation.from_euler("z", -place.turns_rad[0]).as_matrix()
+    back[:3, :3] = Rotation.from_euler("z", -place.turntable_rad[0]).as_matrix()
     return np.asarray(back @ poses[0])
 
 
 def _missed(driven: SimulatedPath) -> np.ndarray:
     """Waypoints (k, 3) that are not reached, on the surface."""
-    height = driven.process.standoff_m
+    height = driven.strategy.standoff_m
     places = [
-        (line.positions + height * line.axes)[verdict != "reached"]
-        for line, verdict in zip(driven.lines, driven.metrics.verdicts, strict=True)
+        (group.process.positions + height * group.process.axes)[verdict != "reached"]
+        for group, verdict in zip(driven.path.groups, driven.metrics.verdicts, strict=True)
     ]
     return np.concatenate([np.zeros((0, 3)), *places])
 

@@ -21,8 +21,8 @@ _MEANS = {
 }
 _TOUCHED = {"object": "the object", "floor": "the floor", "itself": "the arm itself"}
 _DOING = {
-    "free": "on its way", "approach": "coming down", "process": "at work", "retract": "lifting",
-    "turn": "the object turns",
+    "transition": "on its way", "approach": "coming down", "process": "at work",
+    "retract": "lifting", "turntable": "the object turns",
 }  # fmt: skip
 
 
@@ -93,7 +93,7 @@ class ArmTab:
         if playback.line[at] >= 0:
             words.append(f"line {playback.line[at]}")
         if playback.doing[at] == "process" and path["force"] is not None:
-            words.append(f"{playback.force_n[at]:.1f} N of {path['force']['asked_n']:g} N")
+            words.append(f"{playback.force_n[at]:.1f} N of {path['force']['commanded_n']:g} N")
         said = " · ".join(words)
         if self.now.content != said:
             self.now.content = said

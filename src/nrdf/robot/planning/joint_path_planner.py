@@ -1,0 +1,162 @@
+"""Joint paths that cover the process segments of a tool path, without a jump of configuration.
+
+From waypoints in the middle of each segment, reached in every configuration that is found and at
+every turntable index, the arm tracks the segment to both sides as far as it can. The longest joint
+paths are taken; where one ends, the tool lifts off and another begins. What is left over is tried
+again with the tool axis tilted a little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from nrdf.robot.model.cell import Cell
+from nrdf.robot.planning.approach_retract import add_approach_retract
+from nrdf.robot.planning.candidates import CandidatePaths, track_beyond, track_from
+from nrdf.robot.planning.inverse_kinematics import SeedLibrary
+from nrdf.robot.planning.joint_path import JointPath, densify
+from nrdf.robot.planning.reachability import Reachability, solve_everywhere
+from nrdf.toolpath.types import SegmentGroup
+
+_ANCHORS_APART = 60
+_ROUNDS, _TILTED_ROUNDS = 5, 2
+_SHORTEST = 3  # waypoints of a joint path that is worth a lift, unless nothing longer is found
+
+
+def plan_joint_paths(
+    cell: Cell, library: SeedLibrary, groups: Sequence[SegmentGroup]
+) -> tuple[list[JointPath], list[np.ndarray], list[Reachability]]:
+    """Joint paths that cover the groups' process segments as far as the arm can.
+
+    Also for each group which waypoints (n,) are covered, and the reachability of those that are
+    not; it is only meaningful for those.
+    """
+    covered = [np.zeros(len(group.process.positions), bool) for group in groups]
+    paths: list[JointPath] = []
+    for round_ in range(_ROUNDS):
+        anchors = _all_anchors(covered, round_)
+        if not anchors:
+            break
+        fresh = track_from(cell, library, groups, covered, anchors, tilt=False)
+        paths += _cover(cell, groups, fresh, covered, _SHORTEST if round_ < 2 else 1)
+    paths = _lengthened(cell, groups, paths, covered)
+    for round_ in range(_TILTED_ROUNDS):
+        anchors = _all_anchors(covered, round_ + 2)
+        if not anchors:
+            break
+        fresh = track_from(cell, library, groups, covered, anchors, tilt=True)
+        paths += _cover(cell, groups, fresh, covered, 1)
+    reachability = []
+    for group, done in zip(groups, covered, strict=True):
+        made = Reachability(*(done.copy() for _ in range(3)))
+        missing = np.flatnonzero(~done)
+        if len(missing):
+            process = group.process
+            found = solve_everywhere(
+                cell, library, process.positions[missing], process.axes[missing]
+            )[1]
+            for name in ("solved", "collision_free", "regular"):
+                getattr(made, name)[missing] = getattr(found, name)
+        reachability.append(made)
+    return paths, covered, reachability
+
+
+def _all_anchors(covered: Sequence[np.ndarray], round_: int) -> list[tuple[int, int]]:
+    return [(i, k) for i, done in enumerate(covered) for k in _anchors(done, round_)]
+
+
+def _anchors(done: np.ndarray, round_: int) -> list[int]:
+    """The middle of each stretch that is not covered; of a long one, of each part."""
+    missing = np.flatnonzero(~done)
+    chosen = []
+    for run in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
+        if len(run):
+            parts = np.array_split(run, int(np.ceil(len(run) / (_ANCHORS_APART >> min(round_, 3)))))
+            chosen += [int(part[len(part) // 2]) for part in parts]
+    return chosen
+
+
+def _lengthened(
+    cell: Cell,
+    groups: Sequence[SegmentGroup],
+    paths: list[JointPath],
+    covered: list[np.ndarray],
+) -> list[JointPath]:
+    """Joint paths of segments that are not all covered, longer by what the tool reaches when its
+    axis tilts."""
+    whole = [bool(done.all()) for done in covered]
+    again = [path for path in paths if not whole[path.group]]
+    if not again:
+        return paths
+    candidates = track_beyond(cell, groups, again, covered)
+    for path in again:
+        covered[path.group][:] = False
+    kept = [path for path in paths if whole[path.group]]
+    return kept + _cover(cell, groups, candidates, covered, 1)
+
+
+def _cover(
+    cell: Cell,
+    groups: Sequence[SegmentGroup],
+    candidates: CandidatePaths,
+    covered: list[np.ndarray],
+    least: int,
+) -> list[JointPath]:
+    """Joint paths, longest first; those whose approach or retract is blocked are left out."""
+    paths: list[JointPath] = []
+    dropped = np.zeros(len(candidates.group), bool)
+    popular = np.bincount(
+        candidates.turntable_index, candidates.good.sum(axis=1), len(cell.T_base_object)
+    )
+    rank = np.argsort(np.argsort(popular)) / len(popular)
+    while True:
+        best: dict[int, tuple[float, int, int, int]] = {}
+        for t in np.flatnonzero(~dropped):
+            i = int(candidates.group[t])
+            todo = candidates.good[t, : len(covered[i])] & ~covered[i]
+            index = np.flatnonzero(todo)
+            if len(index) < least:
+                continue
+            parted = (np.diff(index) > 1) | candidates.blocked[t, index[:-1]]
+            run = max(np.split(index, np.flatnonzero(parted) + 1), key=len)
+            # Of equally long ones, at the turntable index where most is done.
+            score = len(run) + 0.9 * rank[candidates.turntable_index[t]]
+            if len(run) >= least and score > best.get(i, (0.0,))[0]:
+                best[i] = (score, int(t), int(run[0]), int(run[-1]))
+        if not best:
+            return paths
+        chosen = [(row, first, last) for _, row, first, last in best.values()]
+        for (row, first, last), path in zip(
+            chosen, _complete(cell, groups, candidates, chosen), strict=True
+        ):
+            if path is not None:
+                paths.append(path)
+                covered[path.group][first : last + 1] = True
+            elif not candidates.blocked[row, first:last].any():
+                dropped[row] = True
+
+
+def _complete(
+    cell: Cell,
+    groups: Sequence[SegmentGroup],
+    candidates: CandidatePaths,
+    chosen: Sequence[tuple[int, int, int]],
+) -> list[JointPath | None]:
+    """Parts of candidates as whole joint paths.
+
+    None where something is in the way, which is noted as blocked, or where the tool cannot leave
+    the surface.
+    """
+    found = densify(cell, groups, [candidates.joint_path(*part) for part in chosen])
+    clear = []
+    for k, ((row, first, last), (_, hit)) in enumerate(zip(chosen, found, strict=True)):
+        candidates.blocked[row, first:last] |= hit
+        if not hit.any():
+            clear.append(k)
+    made: list[JointPath | None] = [None] * len(chosen)
+    whole = add_approach_retract(cell, groups, [found[k][0] for k in clear])
+    for k, path in zip(clear, whole, strict=True):
+        made[k] = path
+    return made
