@@ -1,4 +1,4 @@
-"""What all exports share: strokes, names, options, and what bad input is told."""
+"""What all exports share: blends, names, options, and what bad input is told."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from nrdf.commands.export import export
 from nrdf.errors import OutputError, ProcessError
 from nrdf.export.names import identifier, number, plain_text
 from nrdf.export.options import Options
-from nrdf.export.prepare import strokes
+from nrdf.export.prepare import blended_segments
 from nrdf.export.registry import FORMATS, export_job
 from nrdf.io.result_folder import MANIFEST
 from nrdf.toolpath.file import write_toolpaths
@@ -42,7 +42,8 @@ def job_of(*paths):
 
 def blends_mm(*segments, blend_mm=5.0):
     return [
-        np.round(1000 * s.blends_m, 6).tolist() for s in strokes(path_of(*segments), blend_mm / 1e3)
+        np.round(1000 * s.blends_m, 6).tolist()
+        for s in blended_segments(path_of(*segments), blend_mm / 1e3)
     ]
 
 
@@ -67,11 +68,11 @@ def test_waypoints_that_repeat_the_one_before_are_left_out():
     first, second = straight("approach", 0, 100), straight("process", 100, 100, 200)
     second.quaternions_xyzw[0] *= -1  # the same orientation
     second.quaternions_xyzw[1:] = [0.0, 1.0, 0.0, 0.0]  # another one
-    driven = strokes(path_of(first, second), 0.005)
-    assert [1000 * s.positions[:, 0] for s in driven][1].tolist() == [100, 200]
-    assert driven[1].quaternions_xyzw.tolist() == [[0, 1, 0, 0]] * 2
-    only = strokes(path_of(first, straight("process", 100, force=3.0)), 0.005)
-    assert [len(s.positions) for s in only] == [2, 0]
+    driven = blended_segments(path_of(first, second), 0.005)
+    assert [1000 * s.segment.positions[:, 0] for s in driven][1].tolist() == [100, 200]
+    assert driven[1].segment.quaternions_xyzw.tolist() == [[0, 1, 0, 0]] * 2
+    only = blended_segments(path_of(first, straight("process", 100, force=3.0)), 0.005)
+    assert [len(s.segment.positions) for s in only] == [2, 0]
 
 
 def test_a_touch_without_a_move_still_presses_and_waits(tmp_path):

@@ -1,1 +1,4 @@
-"""Tool paths as files for robots, machine tools and CAM: a registry, and one writer a file."""
+"""Tool paths as files for robots, machine tools and CAM.
+
+In: a job. Out: programs and data, one module for each format (`registry.FORMATS`).
+"""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from nrdf.export.header import (
     commented,
     header,
@@ -16,9 +14,9 @@ from nrdf.export.header import (
 )
 from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options
-from nrdf.export.prepare import prepare, strokes, tool_numbers
+from nrdf.export.prepare import blended_segments, prepare, tool_numbers
 from nrdf.export.rotation import tool_axes
-from nrdf.toolpath.types import Job, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _WIDTH = 72
 _CARRIED = (
@@ -53,10 +51,10 @@ def _path(path: ToolPath) -> list[str]:
         rpm = number(revolutions_per_minute(path.spindle_rad_s), 2)
         lines.append(f"SPINDL/{rpm},RPM,CLW")
     arriving = True
-    for index, stroke in enumerate(strokes(path, 0.0), start=1):
-        segment = stroke.segment
+    for index, blended in enumerate(blended_segments(path, 0.0), start=1):
+        segment = blended.segment
         lines += commented([segment_title(segment, index).upper()], "PPRINT/", width=_WIDTH)
-        gotos = _gotos(stroke.positions, stroke.quaternions_xyzw)
+        gotos = _gotos(segment)
         if arriving and gotos:
             lines += ["RAPID", *gotos.pop(0)]
             arriving = False
@@ -67,12 +65,13 @@ def _path(path: ToolPath) -> list[str]:
     return [*lines, "SPINDL/OFF"] if path.spindle_rad_s is not None else lines
 
 
-def _gotos(positions: np.ndarray, quaternions_xyzw: np.ndarray) -> list[list[str]]:
+def _gotos(segment: Segment) -> list[list[str]]:
     """A GOTO for each waypoint, continued with $ on a second line to keep to 72 columns."""
-    if len(positions) == 0:
+    if len(segment.positions) == 0:
         return []
     made = []
-    for position, axis in zip(1000 * positions, tool_axes(quaternions_xyzw), strict=True):
+    axes = tool_axes(segment.quaternions_xyzw)
+    for position, axis in zip(1000 * segment.positions, axes, strict=True):
         point, direction = ",".join(numbers(position, 5)), ",".join(numbers(axis, 9))
         made.append([f"GOTO/{point},$", direction])
     return made

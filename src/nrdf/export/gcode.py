@@ -18,9 +18,9 @@ from nrdf.export.header import (
 )
 from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options
-from nrdf.export.prepare import Stroke, prepare, strokes, tool_numbers
+from nrdf.export.prepare import blended_segments, prepare, tool_numbers
 from nrdf.export.rotation import rotary_angles_deg, tool_axes
-from nrdf.toolpath.types import Job, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _CARRIED = (
     "Contact force is not carried: it stands in comments. Nor is the tool's turn about its own "
@@ -80,7 +80,7 @@ def _comments(lines: list[str]) -> list[str]:
 
 
 def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
-    driven = strokes(path, 0.0)
+    driven = [blended.segment for blended in blended_segments(path, 0.0)]
     words = _words(driven, options)
     lines = []
     if path.spindle_rad_s is not None:
@@ -88,11 +88,10 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     offset = "G43" if options.without_tcp_control else "G43.4"
     lines += [f"G0 {words[0][1]}", f"{offset} H{tool}"]
     row = 0
-    for index, stroke in enumerate(driven, start=1):
-        segment = stroke.segment
+    for index, segment in enumerate(driven, start=1):
         lines += _comments([segment_title(segment, index)])
         feed = f" F{number(60000 * segment.feed_m_s, 2)}"
-        for _ in range(len(stroke.positions)):
+        for _ in range(len(segment.positions)):
             point, angles = words[row]
             if row == 0:
                 lines.append(f"G0 {point} {angles}")
@@ -105,10 +104,10 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     return [*lines, "G49", *(["M5"] if path.spindle_rad_s is not None else [])]
 
 
-def _words(driven: list[Stroke], options: Options) -> list[tuple[str, str]]:
-    """X Y Z and the two angles of each waypoint of a path; C goes on from stroke to stroke."""
-    positions = 1000 * np.concatenate([stroke.positions for stroke in driven])
-    axes = tool_axes(np.concatenate([stroke.quaternions_xyzw for stroke in driven]))
+def _words(driven: list[Segment], options: Options) -> list[tuple[str, str]]:
+    """X Y Z and the two angles of each waypoint of a path; C goes on from segment to segment."""
+    positions = 1000 * np.concatenate([segment.positions for segment in driven])
+    axes = tool_axes(np.concatenate([segment.quaternions_xyzw for segment in driven]))
     angles = rotary_angles_deg(axes, options.rotary, options.tilt)
     if options.without_tcp_control:
         positions = on_tables(positions, angles, options.rotary)

@@ -33,7 +33,7 @@ def header(
     lines = [
         f"Tool paths for a {plain_text(job.category)}, written by nrdf.",
         f"Frame: {plain_text(job.frame)}. Positions are those of the tool centre point. {unit}",
-        _lying(job),
+        _object_pose(job),
         f"Orientation: {orientation}",
         carried,
         *([notes] if notes else []),
@@ -46,7 +46,7 @@ def header(
     ]
 
 
-def _lying(job: Job) -> str:
+def _object_pose(job: Job) -> str:
     """How the object lies in the frame."""
     if job.pose is None:
         return (

@@ -14,7 +14,7 @@ from nrdf.export.header import (
 )
 from nrdf.export.names import number, numbers, program_name, routine_names
 from nrdf.export.options import Options
-from nrdf.export.prepare import Stroke, prepare, strokes, tool_numbers
+from nrdf.export.prepare import BlendedSegment, blended_segments, prepare, tool_numbers
 from nrdf.export.rotation import kuka_abc_deg
 from nrdf.toolpath.types import Job, ToolPath
 
@@ -64,11 +64,11 @@ def write(job: Job, options: Options, folder: Path) -> None:
 def _path(path: ToolPath, options: Options) -> list[str]:
     lines: list[str] = []
     arriving = True
-    for i, stroke in enumerate(strokes(path, options.blend_mm / 1000), start=1):
-        segment = stroke.segment
+    for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
+        segment = blended.segment
         lines += commented([segment_title(segment, i)], "; ")
         lines.append(f"$VEL.CP={number(segment.feed_m_s, 6)}")
-        for frame, rounded in _frames(stroke):
+        for frame, rounded in _frames(blended):
             lines.append(f"{'PTP' if arriving else 'LIN'} {frame}{' C_DIS' if rounded else ''}")
             arriving = False
         if segment.dwell_s:
@@ -76,13 +76,15 @@ def _path(path: ToolPath, options: Options) -> list[str]:
     return lines
 
 
-def _frames(stroke: Stroke) -> list[tuple[str, bool]]:
+def _frames(blended: BlendedSegment) -> list[tuple[str, bool]]:
     """Frame of each waypoint, and whether the robot may round it."""
-    if len(stroke.positions) == 0:
+    if len(blended.segment.positions) == 0:
         return []
     made = []
-    angles = kuka_abc_deg(stroke.quaternions_xyzw)
-    for position, abc, blend in zip(1000 * stroke.positions, angles, stroke.blends_m, strict=True):
+    angles = kuka_abc_deg(blended.segment.quaternions_xyzw)
+    for position, abc, blend in zip(
+        1000 * blended.segment.positions, angles, blended.blends_m, strict=True
+    ):
         values = zip("XYZABC", numbers(position, 5) + numbers(abc, 6), strict=True)
         made.append(("{" + ",".join(f"{key} {value}" for key, value in values) + "}", bool(blend)))
     return made

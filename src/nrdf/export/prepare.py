@@ -18,16 +18,14 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class Stroke:
-    """A segment as a controller drives it: without waypoints that repeat the one before.
+class BlendedSegment:
+    """A segment as a controller drives it.
 
-    positions (n, 3) m, quaternions_xyzw (n, 4), blends_m (n,): how far before each waypoint the
-    robot may begin to round it, 0 where it must arrive. n may be 0.
+    segment: without waypoints that repeat the one before; n may be 0. blends_m: (n,), how far
+    before each waypoint the robot may begin to round it, 0 where it must arrive.
     """
 
     segment: Segment
-    positions: np.ndarray
-    quaternions_xyzw: np.ndarray
     blends_m: np.ndarray
 
 
@@ -73,7 +71,7 @@ def _prepare_path(path: ToolPath, options: Options, tool_z: ToolZ) -> ToolPath:
     return replace(path, tool=tool, segments=tuple(segments), tcp_quaternion_xyzw=tcp)
 
 
-def strokes(path: ToolPath, blend_m: float) -> list[Stroke]:
+def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
     """The segments of `path` as a controller drives them, rounding waypoints by up to `blend_m`.
 
     A waypoint is not rounded at the path's ends, at a dwell, where the force changes, or by more
@@ -99,10 +97,12 @@ def strokes(path: ToolPath, blend_m: float) -> list[Stroke]:
         after = path.segments[i + 1] if i + 1 < len(path.segments) else None
         if segment.dwell_s or not after or after.force_n != segment.force_n:
             blends[np.flatnonzero(owner <= i)[-1]] = 0.0
-    return [
-        Stroke(segment, positions[owner == i], quaternions[owner == i], blends[owner == i])
-        for i, segment in enumerate(path.segments)
-    ]
+    made = []
+    for i, segment in enumerate(path.segments):
+        own = owner == i
+        segment = replace(segment, positions=positions[own], quaternions_xyzw=quaternions[own])
+        made.append(BlendedSegment(segment, blends[own]))
+    return made
 
 
 def tool_numbers(job: Job, options: Options) -> dict[str, int]:

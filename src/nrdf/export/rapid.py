@@ -14,7 +14,7 @@ from nrdf.export.header import (
 )
 from nrdf.export.names import identifier, identifiers, number, numbers, program_name, routine_names
 from nrdf.export.options import Options
-from nrdf.export.prepare import Stroke, prepare, strokes
+from nrdf.export.prepare import BlendedSegment, blended_segments, prepare
 from nrdf.geometry.frames import xyzw_to_wxyz
 from nrdf.toolpath.types import Job, ToolPath
 
@@ -71,10 +71,10 @@ def write(job: Job, options: Options, folder: Path) -> None:
 def _path(path: ToolPath, options: Options, speeds: dict[float, str], how: str) -> list[str]:
     lines: list[str] = []
     arriving = True
-    for i, stroke in enumerate(strokes(path, options.blend_mm / 1000), start=1):
-        segment = stroke.segment
+    for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
+        segment = blended.segment
         lines += commented([segment_title(segment, i)], "! ")
-        for target, zone in _targets(stroke):
+        for target, zone in _targets(blended):
             move = "MoveJ" if arriving else "MoveL"
             lines.append(f"{move} {target},{speeds[segment.feed_m_s]},{zone},{how};")
             arriving = False
@@ -83,11 +83,13 @@ def _path(path: ToolPath, options: Options, speeds: dict[float, str], how: str) 
     return lines
 
 
-def _targets(stroke: Stroke) -> list[tuple[str, str]]:
+def _targets(blended: BlendedSegment) -> list[tuple[str, str]]:
     """Robtarget and zone of each waypoint."""
-    turns = xyzw_to_wxyz(stroke.quaternions_xyzw)
+    turns = xyzw_to_wxyz(blended.segment.quaternions_xyzw)
     made = []
-    for position, turn, blend in zip(1000 * stroke.positions, turns, stroke.blends_m, strict=True):
+    for position, turn, blend in zip(
+        1000 * blended.segment.positions, turns, blended.blends_m, strict=True
+    ):
         values = f"[{','.join(numbers(position, 5))}],[{','.join(numbers(turn, 9))}]"
         made.append((f"[{values},{_REST}]", "nrdf_zone" if blend else "fine"))
     return made

@@ -21,8 +21,8 @@ FORMATS = {
     "urscript": "nrdf.export.urscript",
     "rapid": "nrdf.export.rapid",
     "krl": "nrdf.export.krl",
-    "csv": "nrdf.export.table",
-    "json": "nrdf.export.plain",
+    "csv": "nrdf.export.csv_file",
+    "json": "nrdf.export.json_file",
 }
 """Format to module; a module is imported when it is used."""
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.export.json_file import describe
 from nrdf.export.names import identifier, plain_text
 from nrdf.export.options import Options
-from nrdf.export.plain import describe
 from nrdf.export.prepare import prepare
 from nrdf.io.atomic import output_errors
 from nrdf.toolpath.types import Job, Segment

@@ -16,7 +16,7 @@ from nrdf.export.header import (
 )
 from nrdf.export.names import number, numbers, plain_text, program_name, routine_names
 from nrdf.export.options import Options
-from nrdf.export.prepare import Stroke, prepare, strokes
+from nrdf.export.prepare import BlendedSegment, blended_segments, prepare
 from nrdf.export.rotation import rotation_vectors
 from nrdf.toolpath.types import Job, ToolPath
 
@@ -99,10 +99,10 @@ def _path(path: ToolPath, options: Options) -> list[str]:
     lines: list[str] = []
     force: float | None = None
     arriving = True
-    for i, stroke in enumerate(strokes(path, options.blend_mm / 1000), start=1):
-        segment = stroke.segment
+    for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
+        segment = blended.segment
         lines += commented([segment_title(segment, i)], "# ")
-        moves = _moves(stroke, options.acceleration_m_s2)
+        moves = _moves(blended, options.acceleration_m_s2)
         if arriving and moves:
             pose = moves.pop(0)[0]
             lines.append(f"movej({pose}, {_JOINT_SPEED})")
@@ -128,14 +128,16 @@ def _release() -> list[str]:
     return ["kill nrdf_pressing", "end_force_mode()"]
 
 
-def _moves(stroke: Stroke, acceleration_m_s2: float) -> list[tuple[str, str]]:
+def _moves(blended: BlendedSegment, acceleration_m_s2: float) -> list[tuple[str, str]]:
     """Pose and motion parameters of each waypoint."""
-    if len(stroke.positions) == 0:
+    if len(blended.segment.positions) == 0:
         return []
-    speed = f"a={number(acceleration_m_s2, 3)}, v={number(stroke.segment.feed_m_s, 5)}"
-    turns = rotation_vectors(stroke.quaternions_xyzw)
+    speed = f"a={number(acceleration_m_s2, 3)}, v={number(blended.segment.feed_m_s, 5)}"
+    turns = rotation_vectors(blended.segment.quaternions_xyzw)
     made = []
-    for position, turn, blend in zip(stroke.positions, turns, stroke.blends_m, strict=True):
+    for position, turn, blend in zip(
+        blended.segment.positions, turns, blended.blends_m, strict=True
+    ):
         values = ", ".join(numbers(position, 7) + numbers(turn, 8))
         how = f"{speed}, r={number(float(blend), 5)}"
         made.append((f"pose_trans(nrdf_frame, p[{values}])", how))
