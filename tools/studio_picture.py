@@ -55,7 +55,7 @@ def main() -> None:
         studio.arm_simulation.worker.wait(900)
         playback = studio.arm_simulation.playback
         assert playback is not None, "the simulation failed"
-        at_work = playback.times[playback.doing == "process"]
+        at_work = playback.times[playback.motion == "process"]
         studio.arm_simulation.seek(float(at_work[len(at_work) // 3]))
         studio.panel.refresh()
         time.sleep(5)

@@ -66,8 +66,8 @@ def main() -> None:
         document = editor.document
         spent = took(lambda: results.transfer(document, silent), 1)
         print(f"both on {TARGETS[0]}, regions and tool paths: {spent:.2f} s")
-        spent = took(lambda: results.described(document, silent), 1)
-        described = results.described(document, silent)
+        spent = took(lambda: results.correspondence_features(document, silent), 1)
+        described = results.correspondence_features(document, silent)
         print(f"likeness, the first place on two objects: {spent:.2f} s")
         spent = took(lambda: described.distances(middle))
         print(f"likeness, each place that the cursor goes on to: {spent:.4f} s")

@@ -65,7 +65,7 @@ class Page:
         return " ".join(self.said)
 
     def bring(self):
-        return self.does(self.studio.panel.targets._bring)
+        return self.does(self.studio.panel.targets._transfer)
 
     def change(self, **numbers):
         self.editor.change_numbers("top", 0, numbers)
@@ -82,7 +82,7 @@ def page(tmp_path, untrained):
 
 
 def test_files_that_cannot_be_read(page, monkeypatch):
-    load = page.studio.panel.object._load
+    load = page.studio.panel.reference._load
 
     def said(name, content):
         return page.does(load, SimpleNamespace(name=name, content=content))
@@ -95,7 +95,7 @@ def test_files_that_cannot_be_read(page, monkeypatch):
 
 
 def test_regions_that_cannot_be(page):
-    assert "'front' already" in page.does(page.studio.panel.paint._rename, "front")
+    assert "'front' already" in page.does(page.studio.panel.regions._rename, "front")
     page.paint("front", faces(cloud())["top"])
     assert "tick 'Regions may overlap'" in page.bring()
     page.paint("front", [])
@@ -108,21 +108,21 @@ def test_regions_that_cannot_be(page):
 def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
     told = page.change(feed_mm_s=0.0)
     assert told.startswith("⚠ region 'top'")
-    assert "feed_m_s (*Speed, mm/s*): must be above 0.0, not 0.0" in told
+    assert "feed_m_s (*Feed, mm/s*): must be above 0.0, not 0.0" in told
     assert "feed_m_s: must be above 0.0" in page.bring()
     told = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
-    assert "stepover_m (*Between lines, mm*) is 2 (2000 mm), above what is plausible" in told
+    assert "stepover_m (*Stepover, mm*) is 2 (2000 mm), above what is plausible" in told
 
 
 def test_without_a_model_or_a_result(page):
-    assert "nothing has been brought to a target" in page.does(
+    assert "nothing is transferred to a target" in page.does(
         page.studio.arm_simulation.start, "new"
     )
     page.weights = None
     assert "no model for 'chair'" in page.bring()
-    assert "no model for 'chair'" in page.studio.panel._error.content, "until the next act"
-    page.does(page.studio.panel.undo)
-    assert not page.studio.panel._error.visible
+    assert "no model for 'chair'" in page.studio.panel.error.content, "until the next act"
+    page.does(page.studio.panel.regions.undo)
+    assert not page.studio.panel.error.visible
 
 
 def test_without_mujoco_the_button_says_what_to_install(page, monkeypatch):
@@ -136,20 +136,20 @@ def test_without_mujoco_the_button_says_what_to_install(page, monkeypatch):
 def test_several_targets_stand_side_by_side(page):
     page.does(page.studio.panel.targets._add, ALL)
     keys = [REFERENCE, "new", *BUNDLED[1:]]
-    assert page.studio.shown() == keys == list(page.studio.scene.objects)
+    assert page.studio.visible_objects() == keys == list(page.studio.scene.objects)
     spans = [object_view.corners[:, 2] for object_view in page.studio.scene.objects.values()]
     assert all(a.min() > b.max() for a, b in pairwise(spans)), "none overlap"
     page.does(page.studio.panel.targets._show, "rocker")
-    assert page.studio.shown() == [REFERENCE, "rocker"]
+    assert page.studio.visible_objects() == [REFERENCE, "rocker"]
 
 
-def test_likeness_follows_the_place_that_is_pointed_at(page):
+def test_similarity_follows_the_picked_point(page):
     studio = page.studio
     page.bring()
-    assert "point at the reference" in page.does(studio.compare, "new", 3)
+    assert "pick a point of the reference" in page.does(studio.compare, "new", 3)
     page.does(studio.compare, REFERENCE, 3)
     first = studio.descriptor_distances("new")
-    assert studio.colouring == "likeness" and studio.descriptor_distances(REFERENCE).argmin() == 3
+    assert studio.colouring == "similarity" and studio.descriptor_distances(REFERENCE).argmin() == 3
     with studio.reporting_errors():
         studio.compare(REFERENCE, 700)
     assert not studio.worker.busy, "at once"
@@ -162,9 +162,9 @@ def test_likeness_follows_the_place_that_is_pointed_at(page):
 
 
 def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
-    """Taking callbacks away would end the drag that is under way, and turn the camera."""
+    """Taking callbacks away would end the drag that is under way, and orbit the camera."""
     taken_away = []
-    ground = page.studio.scene.objects[REFERENCE].ground
+    ground = page.studio.scene.objects[REFERENCE].drag_box
     take_away = type(ground).remove_drag_callback
 
     def remove_drag_callback(handle, *words):
@@ -172,23 +172,23 @@ def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
         take_away(handle, *words)
 
     monkeypatch.setattr(type(ground), "remove_drag_callback", remove_drag_callback)
-    page.does(page.studio.mouse.take, "Brush")
+    page.does(page.studio.mouse.select_tool, "Brush")
     assert ground.visible
     page.does(page.studio.sync)
-    page.does(page.studio.mouse.take, "Arrow")
+    page.does(page.studio.mouse.select_tool, "Direction")
     assert not taken_away
-    page.does(page.studio.mouse.take, "Turn")
+    page.does(page.studio.mouse.select_tool, "Orbit")
     assert ground in taken_away and not ground.visible
 
 
-def test_the_room_that_a_tool_needs(page):
+def test_tool_clearance(page):
     tab = page.studio.panel.process
     page.does(tab.refresh)
     assert tab.tool_clearance.value == 20.0
     tab.tool_clearance.value = 35.0
-    page.does(tab._tool)
+    page.does(tab._set_tool)
     assert page.editor.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
     tab.tool_clearance.value = -1.0
-    page.does(tab._tool)
+    page.does(tab._set_tool)
     page.does(tab.refresh)
     assert "clearance_m" in tab.status.content and "-0.001" in tab.status.content

@@ -86,7 +86,7 @@ class Person:
     def take(self, tool: str) -> None:
         """Another tool; the page says when it is in the hand."""
         self.press(tool)
-        self.reads(f"In your hand: {tool}")
+        self.reads(f"Mouse tool {tool}:")
 
     def field(self, label: str):
         shown = "input[not(@type='hidden')]"
@@ -107,9 +107,9 @@ class Person:
         """Where a shown point of an object is on the screen."""
         client = next(iter(self.studio.server.get_clients().values()))
         object_view = self.studio.scene.objects[key]
-        place = object_view.view(camera_of(client)).project(object_view.paintable.points[[index]])[
-            0
-        ][0]
+        place = object_view.camera(camera_of(client)).project(
+            object_view.paintable.points[[index]]
+        )[0][0]
         box = self.page.locator("canvas").first.bounding_box()
         return box["x"] + place[0] * box["width"], box["y"] + place[1] * box["height"]
 
@@ -214,7 +214,7 @@ def test_all_steps(person, studio, tmp_path):
     editor, page = studio.editor, person.page
 
     # 1: a bundled chair; a file that is none is answered on the page.
-    person.step("1 Object")
+    person.step("1 Reference")
     bad = tmp_path / "notes.ply"
     bad.write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
     page.locator("input[type=file]").first.set_input_files(bad)
@@ -225,7 +225,7 @@ def test_all_steps(person, studio, tmp_path):
 
     # 2: two regions; the second by brush as well.
     seat, back = (middle_of("reference", name) for name in ("seat", "back-front"))
-    person.step("2 Paint")
+    person.step("2 Regions")
     person.new_region("seat")
     person.click_on(REFERENCE, seat, lambda: editor.document.region("seat").mask.any())
     small = editor.document.region("seat").mask.sum()
@@ -257,15 +257,15 @@ def test_all_steps(person, studio, tmp_path):
 
     # 3: another process on each, drawn at once; a wrong value is answered by field and value.
     person.step("3 Process")
-    person.choose("What is done", "polish")
+    person.choose("Process", "polish")
     person.choose("Pattern", "spiral")
     until(lambda: person.planned("back") and person.planned("seat"), "the plans")
-    person.write("Speed, mm/s", "-5")
+    person.write("Feed, mm/s", "-5")
     person.reads("feed_m_s")
     person.reads("-0.005")
-    person.write("Speed, mm/s", "80")
+    person.write("Feed, mm/s", "80")
     person.choose("Region", "seat")
-    person.take("Arrow")
+    person.take("Direction")
     behind = editor.paintable(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
     behind = int(np.argmin(np.linalg.norm(editor.paintable(REFERENCE).points - behind, axis=1)))
 
@@ -277,11 +277,11 @@ def test_all_steps(person, studio, tmp_path):
     person.reads("% missed")
     person.shoot("process")
 
-    # 4: both on another chair; likeness; a uncertain_regions region is painted by hand.
+    # 4: both on another chair; similarity; a uncertain region is painted by hand.
     person.step("4 Targets")
     person.press("Add the bundled chair")
     until(lambda: "ladder-back" in studio.scene.objects, "the target")
-    person.press("Bring the process there")
+    person.press("Transfer the process")
     until(lambda: studio.results.is_current("ladder-back"), "the transfer")
     found = studio.results.by_target["ladder-back"].transfer_result
     there = bundled_chair("ladder-back")[1]
@@ -289,15 +289,15 @@ def test_all_steps(person, studio, tmp_path):
     assert all(step.path is not None for step in found.paths)
     person.reads("2 tool paths")
     person.shoot("target")
-    person.take("Alike")
-    person.click_on(REFERENCE, seat, lambda: studio.colouring == "likeness")
+    person.take("Similarity")
+    person.click_on(REFERENCE, seat, lambda: studio.colouring == "similarity")
     before = studio.descriptor_distances("ladder-back")
     person.drag_on(
         REFERENCE, seat, back, lambda: (studio.descriptor_distances("ladder-back") != before).any()
     )
-    sync_api.expect(person.field("Colours")).to_have_value("likeness")
+    sync_api.expect(person.field("Colours")).to_have_value("similarity")
     time.sleep(1.0)  # for the picture alone
-    person.shoot("likeness")
+    person.shoot("similarity")
     person.take("Grow")
     there = middle_of("ladder-back", "seat")
     person.click_on("ladder-back", there, lambda: editor.target("ladder-back").corrected)
@@ -316,7 +316,7 @@ def test_all_steps(person, studio, tmp_path):
     lesson = read_bound_knowledge(editor.session.folder / "saved" / "knowledge" / "chair.yaml")
     assert list(lesson.regions) == ["seat", "back"]
     with page.expect_download() as report:
-        person.press("Report as one page")
+        person.press("HTML report of this target")
     assert b"<table>" in Path(report.value.path()).read_bytes()
     job = read_toolpaths(editor.session.folder / "saved" / "ladder-back" / "job")
     assert {path.process for path in job.paths} == {"sand", "polish"}
@@ -325,30 +325,30 @@ def test_all_steps(person, studio, tmp_path):
     # 6: what is left of it, on an arm: simulated beside the page, played, moved by hand, put away.
     if find_spec("mujoco") is not None:
         person.choose("Region", "back")
-        person.step("2 Paint")
+        person.step("2 Regions")
         person.press("Delete")
         until(lambda: editor.document.region("back") is None, "the deletion")
         person.step("4 Targets")
-        person.press("Bring the process there")
+        person.press("Transfer the process")
         until(lambda: studio.results.is_current("ladder-back"), "the transfer")
         person.step("6 Robot")
         person.press("Simulate on the arm")
         person.reads("simulating the arm on ladder-back")
         until(lambda: studio.arm_simulation.playback is not None, "the simulation", 4 * PATIENCE_S)
         person.reads("waypoints reached")
-        person.choose("Speed", "30 ×")
+        person.choose("Playback speed", "30 ×")
         person.press("Play")
         until(lambda: studio.arm_simulation.time_s > 0, "playing")
         person.press("Pause")
         until(lambda: not studio.arm_simulation.player.playing, "pausing")
         work = studio.arm_simulation.playback.times[
-            studio.arm_simulation.playback.doing == "process"
+            studio.arm_simulation.playback.motion == "process"
         ]
         person.write("Time, s", f"{work[len(work) // 2]:.1f}")
         until(
             lambda: abs(studio.arm_simulation.time_s - work[len(work) // 2]) < 0.2, "moving by hand"
         )
-        person.reads("at work")
+        person.reads("· process · line")
         time.sleep(1.0)  # for the picture alone
         person.shoot("arm")
         person.press("Simulate on the arm")
@@ -356,7 +356,9 @@ def test_all_steps(person, studio, tmp_path):
         until(lambda: not studio.arm_simulation.worker.busy, "cancelling")
         assert studio.arm_simulation.playback is not None, "the one before is kept"
         person.field("Show the arm").click()
-        until(lambda: studio.shown() == [REFERENCE, "ladder-back"], "putting the arm away")
+        until(
+            lambda: studio.visible_objects() == [REFERENCE, "ladder-back"], "putting the arm away"
+        )
 
     # Nothing is lost: the page, and the program, begun again.
     page.reload()

@@ -50,9 +50,9 @@ def studio(
     import nrdf
     from nrdf.field.zoo import list_models
     from nrdf.studio.app import Studio
-    from nrdf.studio.computing import SeparateComputing
+    from nrdf.studio.model.computing import ChildProcessComputing
+    from nrdf.studio.model.session import Session
     from nrdf.studio.serving import LOOPBACK, open_server
-    from nrdf.studio.session import Session
 
     categories = [entry.category for entry in list_models()]
     if not categories:
@@ -63,7 +63,7 @@ def studio(
     server = open_server(host, port)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
-        kept, server, SeparateComputing(partial(nrdf.load_model, device=device)), categories,
+        kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
         origin, robot, tool_frame,
     )  # fmt: skip
     if host not in LOOPBACK:

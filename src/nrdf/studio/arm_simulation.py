@@ -1,13 +1,17 @@
-"""The process on a robot arm, in simulation: started, shown, played back and saved."""
+"""A target's job on a robot arm, in simulation: started, shown, played back and saved."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
+
+import viser
 
 from nrdf.errors import RobotError
+from nrdf.studio.context import StudioContext
 from nrdf.studio.model.result_cache import TargetResult
-from nrdf.studio.model.saving import place_of, save_job, zipped
+from nrdf.studio.model.saving import save_job, saved_path, zipped
 from nrdf.studio.model.simulation_process import SimulationProcess, require_mujoco
 from nrdf.studio.model.worker import Progress, Worker
 from nrdf.studio.scene.arm_view import ArmView
@@ -15,40 +19,62 @@ from nrdf.studio.scene.player import Player
 
 if TYPE_CHECKING:
     import numpy as np
-    import viser
 
-    from nrdf.studio.app import Studio
     from nrdf.studio.model.playback import Playback
 
 SIMULATION = "sim"
 
 
+class Status(Protocol):
+    """Shows the progress of work in the background."""
+
+    def started(self, what: str) -> None:
+        """Work has begun."""
+
+    def describe(self, what: str) -> None:
+        """Another part of the work has begun."""
+
+    def progress(self, done: int, total: int) -> None:
+        """A share of the work is done."""
+
+
 class ArmSimulation:
-    """One target's job on the arm: that of the last simulation.
+    """The last simulation: one target's job on the arm.
 
     robot, tool_frame: of `nrdf.robot.model.arm.load_arm`, the bundled arm unless given.
     """
 
-    def __init__(self, studio: Studio, robot: Path | None, tool_frame: str | None) -> None:
-        self.studio, self._robot, self._tool_frame = studio, robot, tool_frame
-        activity = studio.panel.driving
-        self.worker = Worker(activity.started, activity.progress, studio.ended(activity))
+    worker: Worker
+    """Simulates and saves in the background."""
+
+    def __init__(self, context: StudioContext, robot: Path | None, tool_frame: str | None) -> None:
+        self.context, self._robot, self._tool_frame = context, robot, tool_frame
         self.player = Player(self._advance)
         self.key, self.time_s, self.shown = "", 0.0, False
+        self.saved_to: Path | None = None
+        """The folder that the simulation was written to."""
+        self.job = Path()
+        """The job's folder."""
+        self.on_time: Callable[[], None] = lambda: None
+        """Called when the time has gone on."""
         self._arm_view: ArmView | None = None
         self._process: SimulationProcess | None = None
         self._result: TargetResult | None = None
-        self._job = Path()
+
+    def connect(self, status: Status, ended: Callable[[str, str], None]) -> None:
+        """Show the work on the page; `ended` is that of `Worker`."""
+        self._status = status
+        self.worker = Worker(status.started, status.progress, ended)
 
     @property
     def playback(self) -> Playback | None:
-        """What there is to play."""
+        """The simulation as it can be played, if there is one."""
         return None if self._arm_view is None else self._arm_view.playback
 
     @property
     def is_current(self) -> bool:
-        """Whether what was simulated is what is on the target now."""
-        results = self.studio.results
+        """Whether the simulated job is the target's current one."""
+        results = self.context.results
         return results.is_current(self.key) and results.by_target.get(self.key) is self._result
 
     # --- simulating
@@ -56,23 +82,22 @@ class ArmSimulation:
     def start(self, key: str) -> None:
         """Simulate a target's job, in the background.
 
-        Raises RobotError where the simulation's engine is missing, ProcessError where the target
-        has no current result.
+        Raises RobotError where MuJoCo is missing, ProcessError where the target has no current
+        result.
         """
-        result = self.studio.results.ready(key)
+        result = self.context.results.ready(key)
         require_mujoco()
         what = f"simulating the arm on {key}"
 
-        def say(phase: str) -> None:
-            self.studio.panel.driving.says(f"{what}: {phase}")
-
         def work(progress: Progress) -> None:
             progress(0, 1)
-            job = save_job(self.studio.editor, key, result, self.studio.origin)
+            job = save_job(self.context.editor, key, result, self.context.origin)
             process = SimulationProcess(job, self._robot, self._tool_frame)
             try:
-                playback = process.drive(progress, say)
-                self._put(key, result, job, playback, process)
+                playback = process.run(
+                    progress, lambda phase: self._status.describe(f"{what}: {phase}")
+                )
+                self._show_new(key, result, job, playback, process)
             except BaseException:
                 process.end()
                 raise
@@ -82,7 +107,7 @@ class ArmSimulation:
     def save(self, client: viser.ClientHandle) -> None:
         """Write the simulation as `nrdf simulate` does, in the background, and send it.
 
-        Raises RobotError where there is none of what is on the target now.
+        Raises RobotError where there is no simulation of the target's current job.
         """
         process, key = self._process, self.key
         if process is None:
@@ -91,25 +116,26 @@ class ArmSimulation:
             raise RobotError(
                 f"the simulation is of before your last change to {key}: simulate again"
             )
-        place = place_of(self.studio.editor, key, SIMULATION)
-        origin = {**self.studio.origin, "job": str(self._job)}
+        folder = saved_path(self.context.editor, key, SIMULATION)
+        origin = {**self.context.origin, "job": str(self.job)}
 
         def work(progress: Progress) -> None:
-            process.write(place, key, origin, progress)
-            client.send_file_download(f"{key}-sim.zip", zipped(place), save_immediately=True)
-            with self.studio.lock:
-                self.studio.panel.arm.saved(place, self._job)
+            process.write(folder, key, origin, progress)
+            client.send_file_download(f"{key}-sim.zip", zipped(folder), save_immediately=True)
+            with self.context.lock:
+                self.saved_to = folder
+                self.context.refresh_panel()
 
         self.worker.submit("save", "drawing the film and writing the simulation", work)
 
     def clear(self) -> None:
-        """Put the arm away, and forget the simulation."""
+        """Remove the arm and the simulation."""
         self.player.pause()
         if self._process is not None:
             self._process.end()
         if self._arm_view is not None:
             self._arm_view.remove()
-        self._arm_view = self._process = self._result = None
+        self._arm_view = self._process = self._result = self.saved_to = None
         self.key, self.shown = "", False
 
     def stop(self) -> None:
@@ -119,7 +145,7 @@ class ArmSimulation:
         if self._process is not None:
             self._process.end()
 
-    def _put(
+    def _show_new(
         self,
         key: str,
         result: TargetResult,
@@ -127,35 +153,32 @@ class ArmSimulation:
         playback: Playback,
         process: SimulationProcess,
     ) -> None:
-        studio = self.studio
-        with studio.lock, studio.server.atomic():
+        context = self.context
+        with context.lock, context.server.atomic():
             self.clear()
-            object_view = studio.scene.objects.get(key)
+            object_view = context.scene.objects.get(key)
             if object_view is None:
-                raise RobotError(f"{key} is not there any more")
+                raise RobotError(f"{key} was removed while it was simulated")
             self._arm_view = ArmView(object_view, playback)
-            self._process, self._result, self._job = process, result, job
+            self._process, self._result, self.job = process, result, job
             self.key, self.time_s, self.shown = key, 0.0, True
-            studio.arrange()
-            studio.panel.refresh()
+            context.arrange()
+            context.refresh_panel()
 
     # --- playing
 
-    def check(self) -> None:
-        """Go where the object has gone."""
-        object_views = self.studio.scene.objects
-        if (
-            self._arm_view is not None
-            and object_views.get(self.key) is not self._arm_view.object_view
-        ):
+    def check_object(self) -> None:
+        """Remove the simulation where its object was removed."""
+        objects = self.context.scene.objects
+        if self._arm_view is not None and objects.get(self.key) is not self._arm_view.object_view:
             self.clear()
 
-    def follow(self) -> None:
-        """Stand with the object, which has just been put somewhere, if the arm is to be seen."""
+    def follow_object(self) -> None:
+        """Move the arm to its object, which has just been moved, and show or hide it."""
         if self._arm_view is not None:
-            self._arm_view.see(self.shown)
+            self._arm_view.set_visible(self.shown)
             if self.shown:
-                self._arm_view.stand(self._arm_view.object_view.offset)
+                self._arm_view.place(self._arm_view.object_view.offset)
 
     def show(self, shown: bool) -> None:
         """Show the arm with its object alone, or all objects without it.
@@ -167,10 +190,10 @@ class ArmSimulation:
         self.shown = shown
         if not shown:
             self.player.pause()
-        self.studio.arrange()
+        self.context.arrange()
 
     def play(self) -> None:
-        """Play from where it is, or from the beginning where it is at its end."""
+        """Play from the shown moment, or from the beginning where that is the end."""
         if not self.shown:
             self.show(True)
         assert self._arm_view is not None  # else `show` raises
@@ -184,12 +207,12 @@ class ArmSimulation:
             return
         self.time_s = time_s
         if self.shown:
-            with self.studio.server.atomic():
-                self._arm_view.show(self._arm_view.playback.at(time_s))
+            with self.context.server.atomic():
+                self._arm_view.show(self._arm_view.playback.index_at(time_s))
 
     def _advance(self, seconds: float) -> bool:
         """Let time go on; whether there is more."""
-        with self.studio.lock:
+        with self.context.lock:
             if self._arm_view is None:
                 return False
             end = self._arm_view.playback.seconds
@@ -197,10 +220,10 @@ class ArmSimulation:
             more = self.time_s < end
             if not more:
                 self.player.pause()
-            self.studio.panel.arm.played()
+            self.on_time()
             return more
 
     @property
-    def places(self) -> np.ndarray | None:
-        """Places (k, 3) in the scene that a camera has to see, if an arm is shown."""
-        return None if self._arm_view is None or not self.shown else self._arm_view.places
+    def occupied_points(self) -> np.ndarray | None:
+        """Points (k, 3) in the scene that a camera has to see, if an arm is shown."""
+        return None if self._arm_view is None or not self.shown else self._arm_view.occupied_points

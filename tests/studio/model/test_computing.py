@@ -76,7 +76,9 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
     one, other = (results.by_target["new"].transfer_result for results in (here, there))
     assert [p.metrics for p in other.paths] == [p.metrics for p in one.paths]
     assert there.is_current("new") and max(shares) > 0.0
-    one, other = (results.described(document, silent).distances(17) for results in (here, there))
+    one, other = (
+        results.correspondence_features(document, silent).distances(17) for results in (here, there)
+    )
     np.testing.assert_allclose(other["new"], one["new"], atol=1e-6)
     editor.change_numbers("top", 0, {"stepover_mm": 35.0})
     assert not there.is_current("new")
@@ -109,7 +111,7 @@ def test_a_studio_outlives_what_computes_and_opens_again(tmp_path, separate, dea
     try:
         assert studio.worker.wait(120)
         died = "has ended by itself (signal 11, Segmentation fault)"
-        until(lambda: died in studio.panel._error.content)
+        until(lambda: died in studio.panel.error.content)
         time.sleep(0.5)
         assert not studio.worker.busy, "it does not try again by itself"
         assert studio.results.plan(studio.editor.document.regions[0], 0).lines, "planned before"
@@ -120,7 +122,7 @@ def test_a_studio_outlives_what_computes_and_opens_again(tmp_path, separate, dea
                 SimpleNamespace(name="more.xyz", content=b"1 2 3\n" * 9),  # refused, in the process
             )
         assert studio.worker.wait(120)
-        until(lambda: "more.xyz" in studio.panel._error.content)
+        until(lambda: "more.xyz" in studio.panel.error.content)
         with studio.reporting_errors():
             studio.transfer()
         assert studio.worker.wait(120)

@@ -9,7 +9,7 @@ import pytest
 
 from nrdf.bundled import bundled_chair
 from nrdf.studio.model.paintable_cloud import PaintableCloud
-from nrdf.studio.scene.camera import Camera, hit, inside
+from nrdf.studio.scene.camera import Camera, first_hit, points_in_rectangle
 
 
 @pytest.fixture(scope="module")
@@ -102,17 +102,19 @@ def test_a_ray_meets_the_side_that_faces_it(chair, from_the_front):
     target = body.points[middle(body, regions["back-front"])]
     ray = target - from_the_front.position
     ray /= np.linalg.norm(ray)
-    index, depth = hit(body.points, body.normals, from_the_front.position, ray, spacing)
+    index, depth = first_hit(body.points, body.normals, from_the_front.position, ray, spacing)
     assert regions["back-front"][index]
     assert depth == pytest.approx(np.linalg.norm(target - from_the_front.position), abs=0.03)
-    assert hit(body.points, body.normals, from_the_front.position, -ray, spacing) is None
+    assert first_hit(body.points, body.normals, from_the_front.position, -ray, spacing) is None
 
 
 def test_a_box_takes_what_is_seen_or_all(chair, from_the_front):
     body, regions = chair
     spacing, corners = body.surface.spacing, ((0.4, 0.45), (0.6, 0.02))
-    seen = inside(from_the_front, body.points, body.normals, corners, spacing)
-    every = inside(from_the_front, body.points, body.normals, corners, spacing, through=True)
+    seen = points_in_rectangle(from_the_front, body.points, body.normals, corners, spacing)
+    every = points_in_rectangle(
+        from_the_front, body.points, body.normals, corners, spacing, through=True
+    )
     assert (seen & regions["back-front"]).sum() > 0.9 * (every & regions["back-front"]).sum() > 100
     assert (seen & regions["back-back"]).sum() < 0.02 * (every & regions["back-back"]).sum()
     assert not (seen & ~every).any()

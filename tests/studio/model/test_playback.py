@@ -42,25 +42,25 @@ def playback(plate_job, arm):
 def test_the_pad_is_on_the_object_while_it_works(playback):
     orange = [s for s in playback.shapes if s.path == 0 and s.colour[0] > 2 * s.colour[2]]
     (pad,) = orange
-    at_work = np.flatnonzero(playback.doing == "process")[20::25]
+    at_work = np.flatnonzero(playback.motion == "process")[20::25]
     for at in at_work:
         turn = Rotation.from_quat(np.roll(playback.quaternions_wxyz[at, pad.body], -1))
         placed = turn.apply(pad.vertices) + playback.positions[at, pad.body]
-        about = Rotation.from_euler("z", playback.turn_rad[at]).as_matrix()
+        about = Rotation.from_euler("z", playback.turntable_rad[at]).as_matrix()
         R, t = about @ playback.T_cell_object[:3, :3], about @ playback.T_cell_object[:3, 3]
         on_object = (placed - t) @ R
         assert on_object[:, 1].min() == pytest.approx(TOP_M, abs=0.006)
         assert np.abs(on_object[:, [0, 2]]).max() < 0.15
-    assert len(at_work) > 3 and playback.turn_rad[at_work[0]] == pytest.approx(0.4)
+    assert len(at_work) > 3 and playback.turntable_rad[at_work[0]] == pytest.approx(0.4)
 
 
 def test_what_a_playback_holds(playback):
     assert playback.times[0] == 0.0 and (np.diff(playback.times) > 0).all()
     count = len(playback.times)
-    assert playback.positions.shape[0] == len(playback.doing) == len(playback.force_n) == count
-    assert playback.at(-1.0) == 0 and playback.at(1e9) == count - 1
-    assert playback.times[playback.at(3.0)] == pytest.approx(3.0, abs=0.05)
-    assert len(playback.missed) == 0 and playback.report["total"]["reached_share"] == 1.0
+    assert playback.positions.shape[0] == len(playback.motion) == len(playback.force_n) == count
+    assert playback.index_at(-1.0) == 0 and playback.index_at(1e9) == count - 1
+    assert playback.times[playback.index_at(3.0)] == pytest.approx(3.0, abs=0.05)
+    assert len(playback.unreached) == 0 and playback.report["total"]["reached_share"] == 1.0
     bodies = {shape.body for shape in playback.shapes if shape.path == EVERY_PATH}
     assert FLOOR in bodies and len(bodies) == 8, "six links, the base, and what they stand on"
     lowest = min(s.vertices[:, 2].min() for s in playback.shapes if s.body == FLOOR)
@@ -98,17 +98,17 @@ def test_on_the_stage_the_pad_is_on_the_object_too(playback, stage, plate_job):
         turn = Rotation.from_quat(np.roll(frame.wxyz, -1))
         return turn.apply(points) + frame.position
 
-    for at in np.flatnonzero(playback.doing == "process")[20::40]:
+    for at in np.flatnonzero(playback.motion == "process")[20::40]:
         arm_view.show(int(at))
-        scene = placed("/arm", placed(f"/arm/body{pad.body}", pad.vertices * stage.factor))
+        scene = placed("/arm", placed(f"/arm/body{pad.body}", pad.vertices * stage.units_per_m))
         down = np.array([0.0, -1.0, 0.0])
         met = stage.hit(scene.mean(axis=0) - down, down)
         assert met is not None, "the object is below the pad, turned as the turntable is"
         turned = Rotation.from_quat(np.roll(object_view.frame.wxyz, -1))
-        assert turned.magnitude() == pytest.approx(playback.turn_rad[at])
-        point = turned.apply(plate.points[met[1]] * stage.factor) + object_view.frame.position
-        assert scene[:, 1].min() == pytest.approx(point[1], abs=0.006 * stage.factor)
-    seen = arm_view.places
+        assert turned.magnitude() == pytest.approx(playback.turntable_rad[at])
+        point = turned.apply(plate.points[met[1]] * stage.units_per_m) + object_view.frame.position
+        assert scene[:, 1].min() == pytest.approx(point[1], abs=0.006 * stage.units_per_m)
+    seen = arm_view.occupied_points
     assert len(seen) and seen[:, 1].min() < 0.0, "the column's foot is below the raised object"
     arm_view.remove()
     np.testing.assert_allclose(object_view.offset, stood, atol=1e-12)
@@ -123,7 +123,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
     monkeypatch.setenv("MUJOCO_GL", "off")  # pictures take long, and have tests of their own
     seen, said = [], []
     running = SimulationProcess(plate_job)
-    made = running.drive(lambda done, total: seen.append(done / total), said.append)
+    made = running.run(lambda done, total: seen.append(done / total), said.append)
     assert made.report["total"]["waypoints"] == 27 and made.seconds > 5
     assert sorted(set(seen)) == sorted(set(seen), key=seen.index) and 0 < seen[-1] < 1
     assert any("top, sand: " in phase for phase in said)
@@ -139,7 +139,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
 
 def test_what_the_command_line_refuses_is_refused_alike(tmp_path):
     with pytest.raises(ProcessError, match="empty"):
-        SimulationProcess(tmp_path / "empty").drive(silent)
+        SimulationProcess(tmp_path / "empty").run(silent)
 
 
 def test_cancelling_ends_the_process(plate_job):
@@ -149,12 +149,12 @@ def test_cancelling_ends_the_process(plate_job):
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        running.drive(cancelled)
+        running.run(cancelled)
     told, waits = [], threading.Event()
 
     def wait():
         with pytest.raises(Cancelled):
-            running.drive(lambda done, total: waits.set())
+            running.run(lambda done, total: waits.set())
         told.append("cancelled")
 
     waiting = threading.Thread(target=wait)
@@ -198,15 +198,15 @@ def test_a_player_plays_pauses_and_ends_by_itself():
 
 def test_verdicts_are_told_in_words(playback):
     pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
-    from nrdf.studio.panels.arm import verdicts
+    from nrdf.studio.panels.robot import summary
 
     report = json.loads(json.dumps(playback.report, default=float))
-    assert "**100.0%** of 27 waypoints reached, **no** moves with a collision" in verdicts(report)
-    assert "Red points" not in verdicts(report)
+    assert "**100.0%** of 27 waypoints reached, **no** moves with a collision" in summary(report)
+    assert "Red points" not in summary(report)
     (path,) = report["paths"]
     path["verdicts"] |= {"reached": 20, "singular": 3, "too fast": 4}
     path["collisions"] = [{"what": "floor", "depth_m": 0.0123}]
-    said = verdicts(report)
+    said = summary(report)
     assert "⚠ **top**, not reached: 3 singular, 4 too fast." in said
-    assert "*singular*: two of the arm's axes line up there" in said and "*limit*" not in said
-    assert "⚠ **top**: 1 move touches something, the floor by up to 12.3 mm" in said
+    assert "*singular*: at a singularity" in said and "*limit*" not in said
+    assert "⚠ **top**: 1 move collides, with the floor by up to 12.3 mm" in said

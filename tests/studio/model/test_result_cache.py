@@ -111,7 +111,7 @@ def test_a_region_painted_on_the_target_is_taken_as_it_is(results):
     results.transfer(editor.document, silent)
     assert results.by_target["new"].transfer_result.regions["top"].missing == "marked as not there"
     assert "top" in results.by_target["new"].uncertain_regions
-    assert "look at" in title_of(editor, results, "new")
+    assert "check" in title_of(editor, results, "new")
 
 
 def test_a_marked_region_must_be_taught_and_on_the_target(results, untrained):
@@ -129,16 +129,16 @@ def test_an_incomplete_document_is_refused(results):
         results.transfer(results.editor.document, silent)
 
 
-def test_likeness_is_greatest_around_the_point_itself(results):
+def test_similarity_is_greatest_around_the_point_itself(results):
     document = results.editor.document
-    described = results.described(document, silent)
+    described = results.correspondence_features(document, silent)
     away = described.distances(17)[REFERENCE]
     # An untrained C finds each of a shape's points on the same shape again.
     assert away.argmin() == 17 and away[17] == pytest.approx(0, abs=1e-5)
     assert described.distances(18)[REFERENCE].argmin() == 18, "for another point at once"
     assert list(described.objects) == [REFERENCE]
     results.transfer(document, silent)
-    found = results.described(document, silent)
+    found = results.correspondence_features(document, silent)
     assert found.distances(17)["new"].shape == (len(results.editor.paintable("new").points),)
     assert found.objects[REFERENCE] is described.objects[REFERENCE], "computed once"
 

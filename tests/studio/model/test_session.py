@@ -15,7 +15,7 @@ from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.knowledge_file import read_knowledge
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
-from nrdf.studio.model.saving import place_of
+from nrdf.studio.model.saving import saved_path
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.session_file import FILE
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of, shown_numbers
@@ -86,7 +86,7 @@ def test_clouds_that_nothing_needs_any_more_go_when_it_starts_again(painted):
 
 
 def test_starting_anew_can_be_undone(painted):
-    painted.start_anew()
+    painted.new_session()
     assert painted.object_keys() == [] and again(painted).document.reference is None
     assert painted.session.undo() and painted.object_keys() == [REFERENCE]
 
@@ -176,7 +176,7 @@ def test_corrections_follow_their_region(painted):
     painted.paint("other", "top", face(painted.paintable("other").cloud, "top"))
     painted.rename_region("top", "lid")
     assert list(painted.target("other").corrected) == ["lid"]
-    painted.forget_corrections("other")
+    painted.discard_corrections("other")
     assert not painted.target("other").corrected
     painted.paint("other", "lid", face(painted.paintable("other").cloud, "top"))
     painted.remove_region("lid")
@@ -195,7 +195,7 @@ def test_names_of_targets_are_no_paths_and_differ(painted):
 def test_overlaps_are_told(painted):
     painted.add_region("front")
     painted.paint(REFERENCE, "front", painted.document.region("top").mask)
-    assert "top" in painted.shared()[0] and "front" in painted.shared()[0]
+    assert "top" in painted.overlaps()[0] and "front" in painted.overlaps()[0]
     with pytest.raises(ProcessError, match="overlap"):
         bound_knowledge_of(painted.session.clouds, painted.document)
     painted.allow_overlap(True)
@@ -274,11 +274,11 @@ def test_no_name_of_an_upload_leads_out_of_the_sessions_folder(painted, name):
     got = painted.add_target(name, cloud(SIZE, seed=1))
     assert got not in ("", ".", "..") and "/" not in got and "\\" not in got
     saved = painted.session.folder / "saved"
-    assert place_of(painted, got, "job") == saved / got / "job"
+    assert saved_path(painted, got, "job") == saved / got / "job"
 
 
 def test_names_in_a_session_that_somebody_else_wrote_do_not_lead_out_of_its_folder(painted):
     saved = painted.session.folder / "saved"
     for name in ("..", "../..", "/tmp", "a/../../b"):
-        place = place_of(painted, name, "job")
+        place = saved_path(painted, name, "job")
         assert place.parent.parent == saved and place.name == "job"

@@ -83,7 +83,7 @@ class Editor:
             Document(knowledge.category, loaded, regions, (), knowledge.allow_overlap)
         )
 
-    def start_anew(self) -> None:
+    def new_session(self) -> None:
         """Put everything away; undoing brings it back."""
         self.session.change(Document(self.document.category))
 
@@ -169,7 +169,7 @@ class Editor:
             document = self.document.with_target(key, corrected={**target.corrected, region: whole})
         self.session.change(document, merge)
 
-    def forget_corrections(self, key: str) -> None:
+    def discard_corrections(self, key: str) -> None:
         """Let a target's regions be what is found again."""
         self.session.change(self.document.with_target(key, corrected={}))
 
@@ -177,7 +177,7 @@ class Editor:
         """Whether regions may have points in common."""
         self.session.change(replace(self.document, allow_overlap=allowed))
 
-    def shared(self) -> list[str]:
+    def overlaps(self) -> list[str]:
         """A line for each two regions that overlap by more than their borders."""
         regions = {r.name: np.flatnonzero(r.mask) for r in self.document.regions if r.mask.any()}
         return overlaps(regions)

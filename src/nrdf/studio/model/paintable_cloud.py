@@ -33,6 +33,11 @@ class PaintableCloud:
         self.surface = Surface(self.points, self.normals)
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
 
+    @property
+    def longest_side(self) -> float:
+        """The longest side of the bounding box, m."""
+        return float((self.high - self.low).max())
+
     @cached_property
     def canvas(self) -> Canvas:
         """The shown points, to be painted on."""

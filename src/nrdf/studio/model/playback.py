@@ -47,24 +47,24 @@ class Shape:
 class Playback:
     """A job on an arm, in the cell's frame (`nrdf.robot.model.cell.Placement`), about every 40 ms.
 
-    times: (t,), s, and what is at each: path (t,), the number of the tool path; doing: (t,) as
-    `nrdf.robot.planning.program.ActionKind`; line (t,), -1 where none is driven; force_n (t,);
-    turn_rad (t,), of the object. positions (t, b, 3) and quaternions_wxyz (t, b, 4): of the bodies.
-    T_cell_object: (4, 4), of the object at turn 0. missed: (k, 3), waypoints that are not reached,
-    in the object's frame, m. report: what report.json says.
+    times: (t,), s. At each: path (t,), the number of the tool path; motion (t,), a
+    `nrdf.robot.planning.program.ActionKind`; line (t,), -1 between lines; force_n (t,); turntable_rad
+    (t,); positions (t, b, 3) and quaternions_wxyz (t, b, 4) of the bodies. T_cell_object: (4, 4),
+    of the object at turntable angle 0. unreached: (k, 3), waypoints that are not reached, in the
+    object's frame, m. report: the content of report.json.
     """
 
     shapes: tuple[Shape, ...]
     times: np.ndarray
     path: np.ndarray
-    doing: np.ndarray
+    motion: np.ndarray
     line: np.ndarray
     force_n: np.ndarray
-    turn_rad: np.ndarray
+    turntable_rad: np.ndarray
     positions: np.ndarray
     quaternions_wxyz: np.ndarray
     T_cell_object: np.ndarray
-    missed: np.ndarray
+    unreached: np.ndarray
     report: dict[str, Any]
 
     @property
@@ -72,7 +72,7 @@ class Playback:
         """How long the job takes."""
         return float(self.times[-1])
 
-    def at(self, time_s: float) -> int:
+    def index_at(self, time_s: float) -> int:
         """The index of a moment."""
         return int(np.clip(np.searchsorted(self.times, time_s), 0, len(self.times) - 1))
 
@@ -98,10 +98,10 @@ def playback_of(simulated: SimulationResult) -> Playback:
             added = {
                 "times": clock + kept * STEP_S,
                 "path": np.full(count, number),
-                "doing": np.full(count, log.action.kind),
+                "motion": np.full(count, log.action.kind),
                 "line": np.full(count, line),
                 "force_n": log.force_n[kept],
-                "turn_rad": turn + step * np.linspace(1 / count, 1, count),
+                "turntable_rad": turn + step * np.linspace(1 / count, 1, count),
                 "positions": positions.astype(np.float32),
                 "quaternions_wxyz": quaternions.astype(np.float32),
             }
@@ -113,7 +113,7 @@ def playback_of(simulated: SimulationResult) -> Playback:
         tuple(shapes),
         **{name: np.concatenate(values) for name, values in parts.items()},
         T_cell_object=_upright(simulated),
-        missed=np.concatenate([_missed(driven) for driven in simulated.paths]),
+        unreached=np.concatenate([_unreached(driven) for driven in simulated.paths]),
         report=simulation_report(simulated),
     )
 
@@ -218,7 +218,7 @@ def _upright(simulated: SimulationResult) -> np.ndarray:
     return np.asarray(back @ poses[0])
 
 
-def _missed(driven: SimulatedPath) -> np.ndarray:
+def _unreached(driven: SimulatedPath) -> np.ndarray:
     """Waypoints (k, 3) that are not reached, on the surface."""
     height = driven.strategy.standoff_m
     places = [

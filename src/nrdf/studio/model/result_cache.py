@@ -112,10 +112,10 @@ class ResultCache:
         """A target's result. Raises ProcessError where there is none of what is painted now."""
         result = self.by_target.get(key)
         if result is None:
-            raise ProcessError("nothing has been brought to a target yet: do so in step 4")
+            raise ProcessError("nothing is transferred to a target yet: do so in step 4")
         if not self.is_current(key):
             raise ProcessError(
-                f"what is on {key} is of before your last change: press 'Bring the process there' "
+                f"the result on {key} is of before your last change: press 'Transfer the process' "
                 "in step 4 first"
             )
         return result
@@ -158,9 +158,11 @@ class ResultCache:
             raise type(error)(f"target {name}: {error}") from None
         self.by_target[name] = TargetResult(transfer_result, lesson, target)
 
-    # --- likeness
+    # --- similarity
 
-    def described(self, document: Document, progress: Progress) -> CorrespondenceFeatures:
+    def correspondence_features(
+        self, document: Document, progress: Progress
+    ) -> CorrespondenceFeatures:
         """What the descriptors of the reference and of every target with a result say, computed
         where it has changed."""
         self._taught(document, progress)

@@ -36,7 +36,7 @@ def save_knowledge(editor: Editor) -> Path:
     """
     knowledge, document = knowledge_of(editor.session.clouds, editor.document), editor.document
     assert document.reference is not None  # else there is no knowledge
-    place = place_of(editor, "knowledge")
+    place = saved_path(editor, "knowledge")
     with output_folder(place, overwrite=True) as folder:
         file = f"{knowledge.category}.yaml"
         write_knowledge(folder / file, knowledge, explained=True)
@@ -48,7 +48,7 @@ def save_knowledge(editor: Editor) -> Path:
 
 def save_job(editor: Editor, name: str, result: TargetResult, origin: Mapping[str, Any]) -> Path:
     """A target's job, as `nrdf transfer` writes it; its folder."""
-    place = place_of(editor, name, "job")
+    place = saved_path(editor, name, "job")
     with output_folder(place, overwrite=True) as folder:
         write_job_files(folder, result.transfer_result, Limits(), name, origin)
     return place
@@ -56,7 +56,7 @@ def save_job(editor: Editor, name: str, result: TargetResult, origin: Mapping[st
 
 def save_programs(editor: Editor, name: str, result: TargetResult, formats: Sequence[str]) -> Path:
     """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
-    place = place_of(editor, name, "programs")
+    place = saved_path(editor, name, "programs")
     with output_folder(place, overwrite=True) as folder:
         export_job(job_of(result.transfer_result), formats, folder)
     return place
@@ -79,7 +79,7 @@ def save_picture(editor: Editor, results: ResultCache) -> Path:
         result = results.by_target.get(target.object.name)
         if result is not None:
             panels.append(panel_of(result.transfer_result, target.object.name))
-    place = place_of(editor, "picture.png")
+    place = saved_path(editor, "picture.png")
     with output_file(place):
         draw_regions(panels, place)
     return place
@@ -95,7 +95,7 @@ def zipped(folder: Path) -> bytes:
     return buffer.getvalue()
 
 
-def place_of(editor: Editor, *parts: str) -> Path:
+def saved_path(editor: Editor, *parts: str) -> Path:
     """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
     # A session's file may have been written by somebody else, with any names.
     return editor.session.folder.joinpath(SAVED, *(safe_file_name(p, "target") for p in parts))

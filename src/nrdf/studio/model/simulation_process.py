@@ -27,12 +27,12 @@ def require_mujoco() -> None:
 
 
 class SimulationProcess:
-    """A process that drives one job on an arm: the bundled one, or that of a file."""
+    """A process that simulates one job on an arm: the bundled one, or that of a file."""
 
     def __init__(self, job: Path, robot: Path | None = None, tool_frame: str | None = None) -> None:
         self._child = ChildProcess(_serve, (job, robot, tool_frame), _gone)
 
-    def drive(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
+    def run(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
         """Wait for the simulation; `say` is told what is being done. Raises RobotError and
         ProcessError as `nrdf simulate` does, and what `progress` raises."""
         made: Playback = self._child.wait(progress, say)

@@ -1,131 +1,120 @@
-"""Step 3: what is done to a region."""
+"""Step 3: the processes of a region."""
 
 from __future__ import annotations
 
 import re
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nrdf.process.new_knowledge import KINDS
 from nrdf.reports.transfer_report import short_metric_cells
+from nrdf.studio.context import StudioContext
+from nrdf.studio.model.document import PaintedRegion
 from nrdf.studio.model.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
-
-if TYPE_CHECKING:
-    from nrdf.studio.panels.panel import Panel, PanelEvent
+from nrdf.studio.panels.inputs import Inputs, PanelEvent
 
 _LABELS = {
-    "stepover_mm": ("Between lines, mm", "stepover_mm: distance between neighbouring lines"),
-    "spacing_mm": ("Between waypoints, mm", "spacing_mm: along a line"),
-    "edge_margin_mm": ("Free at the edge, mm", "edge_margin_mm: kept free inside the border"),
-    "passes": ("Passes", "passes: how often the lines are driven"),
-    "force_n": ("Force, N", "force_n: along the tool; 0: none"),
-    "force_tolerance_n": ("Force may be off by, N", "force_tolerance_n; 0: not said"),
-    "feed_mm_s": ("Speed, mm/s", "feed_mm_s: along the lines"),
-    "lead_deg": ("Lead, °", "lead_deg: the tool's tail leans towards the travel"),
-    "tilt_deg": ("Tilt, °", "tilt_deg: to the right of it"),
-    "standoff_mm": ("Above the surface, mm", "standoff_mm: 0 where the tool touches"),
+    "stepover_mm": ("Stepover, mm", "stepover_mm: distance between neighbouring lines"),
+    "spacing_mm": ("Waypoint spacing, mm", "spacing_mm: distance of waypoints along a line"),
+    "edge_margin_mm": ("Edge margin, mm", "edge_margin_mm: kept free inside the region's border"),
+    "passes": ("Passes", "passes: how often the lines are run"),
+    "force_n": ("Force, N", "force_n: along the tool axis; 0: no force control"),
+    "force_tolerance_n": ("Force tolerance, N", "force_tolerance_n; 0: not given"),
+    "feed_mm_s": ("Feed, mm/s", "feed_mm_s: speed along the lines"),
+    "lead_deg": ("Lead, °", "lead_deg: tilt of the tool axis towards the travel"),
+    "tilt_deg": ("Tilt, °", "tilt_deg: tilt of the tool axis to the right of the travel"),
+    "standoff_mm": ("Stand-off, mm", "standoff_mm: height above the surface; 0: contact"),
     "spindle_rpm": ("Spindle, rpm", "spindle_rpm; 0: none"),
 }
+_MAIN = ("stepover_mm", "spacing_mm"), ("force_n", "feed_mm_s", "tilt_deg")
 
 
 class ProcessTab:
     """Choose a kind of process and its parameters; the plan is drawn at once."""
 
-    def __init__(self, panel: Panel) -> None:
-        self.panel, self.studio = panel, panel.studio
-        gui = self.studio.server.gui
-        gui.add_markdown("Say what is done to the region; the tool path is drawn at once.")
+    def __init__(self, context: StudioContext, inputs: Inputs) -> None:
+        self.context, self.inputs = context, inputs
+        gui = context.server.gui
+        gui.add_markdown("Describe the process of the region; its tool path is drawn at once.")
         self.status = gui.add_markdown("")
-        self.kind = gui.add_dropdown(
-            "What is done", KINDS, hint="Choosing one fills in sensible values."
-        )
+        self.kind = gui.add_dropdown("Process", KINDS, hint="Choosing one fills in usual values.")
         self.pattern = gui.add_dropdown("Pattern", PATTERNS)
-        self.numbers = {
-            name: gui.add_number(
-                _LABELS[name][0], 0.0, step=_increment(name), hint=_LABELS[name][1]
-            )
-            for name in NUMBERS[:2]
-        }
+        self.numbers = {name: self._number(name) for name in _MAIN[0]}
         self.direction = gui.add_markdown("")
-        self.longest = gui.add_button("Lines along the longest way", color="gray")
-        rest = [name for name in NUMBERS if name not in self.numbers]
-        for name in ("force_n", "feed_mm_s", "tilt_deg"):
-            self.numbers[name] = self._number(name)
+        self.longest = gui.add_button("Lines along the longest axis", color="gray")
+        self.numbers |= {name: self._number(name) for name in _MAIN[1]}
         self.tool = gui.add_text("Tool", "tool")
-        self.tool_radius = gui.add_number("Tool's radius, mm", 25.0, step=1.0)
+        self.tool_radius = gui.add_number("Tool radius, mm", 25.0, step=1.0)
         with gui.add_folder("More", expand_by_default=False):
-            for name in rest:
-                if name not in self.numbers:
-                    self.numbers[name] = self._number(name)
+            more = [name for name in NUMBERS if name not in self.numbers]
+            self.numbers |= {name: self._number(name) for name in more}
             self.tool_clearance = gui.add_number(
-                "Room the tool needs, mm", 0.0, step=1.0,
-                hint="Free before the surface; places with less are left out. 0: not looked at.",
+                "Tool clearance, mm", 0.0, step=1.0,
+                hint="Free space that the tool needs above the surface; points with less are left "
+                "out. 0: not checked.",
             )  # fmt: skip
-            self.step = gui.add_dropdown("Step", ("1",), hint="One after another on a region.")
-            self.steps = gui.add_button_group("Steps", ("Add one", "Remove this"))
+            self.step = gui.add_dropdown(
+                "Process step", ("1",), hint="Steps are run one after another on the region."
+            )
+            self.steps = gui.add_button_group("Steps", ("Add", "Remove"))
         for name, handle in self.numbers.items():
-            panel.on(handle.on_update, partial(self._number_set, name))
-        panel.on(self.kind.on_update, lambda said: self._kind(said.value))
-        panel.on(self.pattern.on_update, lambda said: self._change(trajectory=said.value))
-        panel.on(self.longest.on_click, lambda _: self._change(direction=None))
-        panel.on(self.tool.on_update, lambda _: self._tool())
-        panel.on(self.tool_radius.on_update, lambda _: self._tool())
-        panel.on(self.tool_clearance.on_update, lambda _: self._tool())
-        panel.on(self.step.on_update, lambda said: self._step(said.value))
-        panel.on(self.steps.on_click, lambda said: self._steps(said.value))
+            inputs.on(handle.on_update, partial(self._set_number, name))
+        inputs.on(self.kind.on_update, lambda event: self._set_kind(event.value))
+        inputs.on(self.pattern.on_update, lambda event: self._change(trajectory=event.value))
+        inputs.on(self.longest.on_click, lambda _: self._change(direction=None))
+        inputs.on(self.tool.on_update, lambda _: self._set_tool())
+        inputs.on(self.tool_radius.on_update, lambda _: self._set_tool())
+        inputs.on(self.tool_clearance.on_update, lambda _: self._set_tool())
+        inputs.on(self.step.on_update, lambda event: self._select_step(event.value))
+        inputs.on(self.steps.on_click, lambda event: self._change_steps(event.value))
 
     def refresh(self) -> None:
-        """The step that is described now, and its plan."""
-        studio = self.studio
-        region = studio.editor.document.region(studio.region)
+        """Show the selected process step and its plan."""
+        context, inputs = self.context, self.inputs
+        region = context.editor.document.region(context.region)
         if region is None:
             self.status.content = "Paint a region in step 2 first."
             return
-        step = region.steps[studio.step]
-        self.panel.set_value(self.kind, str(step["kind"]))
+        step = region.steps[context.step]
+        inputs.set_value(self.kind, str(step["kind"]))
         pattern = str(step.get("trajectory", "raster"))
-        self.panel.set_options(
-            self.pattern, PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern)
-        )
-        self.panel.set_value(self.pattern, pattern)
+        patterns = PATTERNS if pattern in PATTERNS else (*PATTERNS, pattern)
+        inputs.set_options(self.pattern, patterns)
+        inputs.set_value(self.pattern, pattern)
         for name, value in shown_numbers(step).items():
-            self.panel.set_value(self.numbers[name], value)
-        self.panel.set_value(self.tool, str(step["tool"].get("name", "tool")))
-        for handle, length in (
-            (self.tool_radius, "radius_m"),
-            (self.tool_clearance, "clearance_m"),
-        ):
-            self.panel.set_value(handle, float(f"{1e3 * step['tool'].get(length, 0.0):.6g}"))
+            inputs.set_value(self.numbers[name], value)
+        tool = step["tool"]
+        inputs.set_value(self.tool, str(tool.get("name", "tool")))
+        inputs.set_value(self.tool_radius, _millimetres(tool.get("radius_m", 0.0)))
+        inputs.set_value(self.tool_clearance, _millimetres(tool.get("clearance_m", 0.0)))
         names = tuple(f"{i + 1}: {s.get('name', s['kind'])}" for i, s in enumerate(region.steps))
-        self.panel.set_options(self.step, names)
-        self.panel.set_value(self.step, names[studio.step])
+        inputs.set_options(self.step, names)
+        inputs.set_value(self.step, names[context.step])
         direction = step.get("direction")
         self.direction.content = (
-            "Lines run along the region's longest way; take *Arrow* and drag to say otherwise."
+            "Lines run along the region's longest axis; the tool *Direction* changes that."
             if direction is None
             else f"Lines run along ({', '.join(f'{x:.2f}' for x in direction)}): the arrow."
         )
-        self.status.content = self._plan()
+        self.status.content = self._plan(region)
 
-    def _plan(self) -> str:
-        studio = self.studio
-        region = studio.editor.document.region(studio.region)
-        assert region is not None
+    def _plan(self, region: PaintedRegion) -> str:
+        """The metrics of the plan, in Markdown, or why there is none."""
         if not region.mask.any():
             return f"**{region.name}** has no points yet."
-        plan = studio.results.plan(region, studio.step)
+        plan = self.context.results.plan(region, self.context.step)
         if plan is None:
             return "*planning …*"
         if plan.fault or plan.checked is None or plan.checked.metrics is None:
             return f"⚠ {_labelled(plan.fault)}"
         metrics = plan.checked.metrics
-        worked, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(metrics))
+        covered, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(metrics))
         minutes, seconds = divmod(round(metrics.cycle_time_s), 60)
         lines = [
             f"**{metrics.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
-            f"of the region **{worked} %** worked, {left_out} % left out, {missed} % missed",
+            f"of the region **{covered} %** worked, {left_out} % left out, {missed} % missed",
             f"lines at most {widest} mm apart, {off} mm off the object; steps of at most {step} "
             f"mm, turns of at most {turn}°",
         ]
@@ -134,31 +123,32 @@ class ProcessTab:
 
     def _number(self, name: str) -> Any:
         label, hint = _LABELS[name]
-        return self.studio.server.gui.add_number(label, 0.0, step=_increment(name), hint=hint)
+        return self.context.server.gui.add_number(label, 0.0, step=_increment(name), hint=hint)
 
-    def _number_set(self, name: str, said: PanelEvent) -> None:
-        self.studio.need_region()
-        value = float(said.value)
+    def _set_number(self, name: str, event: PanelEvent) -> None:
+        context = self.context
+        context.need_region()
+        value = float(event.value)
         if not np.isfinite(value):
             return
-        self.studio.editor.change_numbers(self.studio.region, self.studio.step, {name: value})
+        context.editor.change_numbers(context.region, context.step, {name: value})
         self._changed()
 
-    def _kind(self, kind: str) -> None:
-        self.studio.need_region()
-        self.studio.editor.restart_step(self.studio.region, self.studio.step, kind)
+    def _set_kind(self, kind: str) -> None:
+        self.context.need_region()
+        self.context.editor.restart_step(self.context.region, self.context.step, kind)
         self._changed()
 
     def _change(self, **content: object) -> None:
-        self.studio.need_region()
-        self.studio.editor.change_step(self.studio.region, self.studio.step, **content)
+        self.context.need_region()
+        self.context.editor.change_step(self.context.region, self.context.step, **content)
         self._changed()
 
-    def _tool(self) -> None:
-        self.studio.need_region()
-        region = self.studio.editor.document.region(self.studio.region)
+    def _set_tool(self) -> None:
+        self.context.need_region()
+        region = self.context.editor.document.region(self.context.region)
         assert region is not None
-        tool = dict(region.steps[self.studio.step]["tool"])
+        tool = dict(region.steps[self.context.step]["tool"])
         tool |= {
             "name": self.tool.value,
             "radius_m": self.tool_radius.value / 1e3,
@@ -166,29 +156,29 @@ class ProcessTab:
         }
         self._change(tool=tool)
 
-    def _step(self, shown: str) -> None:
-        self.studio.step = int(shown.partition(":")[0]) - 1
-        self.studio.draw()
+    def _select_step(self, shown: str) -> None:
+        self.context.step = int(shown.partition(":")[0]) - 1
+        self.context.draw()
         self.refresh()
 
-    def _steps(self, which: str) -> None:
-        studio = self.studio
-        studio.need_region()
-        if which == "Add one":
-            studio.step = studio.editor.add_step(studio.region, self.kind.value)
+    def _change_steps(self, which: str) -> None:
+        context = self.context
+        context.need_region()
+        if which == "Add":
+            context.step = context.editor.add_step(context.region, self.kind.value)
         else:
-            studio.editor.remove_step(studio.region, studio.step)
-            studio.step = max(studio.step - 1, 0)
+            context.editor.remove_step(context.region, context.step)
+            context.step = max(context.step - 1, 0)
         self._changed()
 
     def _changed(self) -> None:
-        self.studio.draw()
-        self.panel.refresh()
-        self.studio.plan()
+        self.context.draw()
+        self.context.refresh_panel()
+        self.context.plan()
 
 
 def _labelled(fault: str) -> str:
-    """A fault with the page's names of fields beside those of a knowledge file."""
+    """A fault with the page's labels of fields beside their names in a knowledge file."""
     fault = fault.removeprefix(f"{ORIGIN}: ")
     for name, (label, _) in _LABELS.items():
         fault = re.sub(rf"\b{si_name(name)}\b", f"{si_name(name)} (*{label}*)", fault, count=1)
@@ -197,3 +187,7 @@ def _labelled(fault: str) -> str:
 
 def _increment(name: str) -> float:
     return 1.0 if name.endswith(("_mm", "_s", "_rpm", "passes")) else 0.5
+
+
+def _millimetres(metres: float) -> float:
+    return float(f"{1e3 * metres:.6g}")

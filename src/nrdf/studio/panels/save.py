@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from nrdf.export.registry import FORMATS
 from nrdf.reports.job_folder import HTML_REPORT
+from nrdf.studio.context import StudioContext
 from nrdf.studio.model.result_cache import TargetResult
 from nrdf.studio.model.saving import save_job, save_knowledge, save_picture, save_programs, zipped
-
-if TYPE_CHECKING:
-    from nrdf.studio.model.worker import Progress
-    from nrdf.studio.panels.panel import Panel, PanelEvent
+from nrdf.studio.model.worker import Progress
+from nrdf.studio.panels.inputs import Inputs, PanelEvent
 
 NO_TARGET = "(none yet)"
 
@@ -20,77 +18,77 @@ NO_TARGET = "(none yet)"
 class SaveTab:
     """Each button writes into the session's folder, and sends the same to the browser."""
 
-    def __init__(self, panel: Panel) -> None:
-        self.panel, self.studio = panel, panel.studio
-        gui = self.studio.server.gui
-        gui.add_markdown("Take away what you need; the command line reads all of it.")
+    def __init__(self, context: StudioContext, inputs: Inputs) -> None:
+        self.context, self.inputs = context, inputs
+        gui = context.server.gui
+        gui.add_markdown("Save what you need; the command line reads all of it.")
         self.knowledge = gui.add_button("Knowledge file, with the reference")
         self.picture = gui.add_button("Picture of all objects")
         self.target = gui.add_dropdown("Target", (NO_TARGET,))
         self.job = gui.add_button("Job of this target")
-        self.page = gui.add_button("Report as one page")
+        self.report = gui.add_button("HTML report of this target")
         self.format = gui.add_dropdown("Robot format", tuple(FORMATS), initial_value="urscript")
         self.programs = gui.add_button("Robot programs of this target")
         self.status = gui.add_markdown("")
-        panel.on(self.knowledge.on_click, self._knowledge)
-        panel.on(self.picture.on_click, self._picture)
-        panel.on(self.job.on_click, lambda said: self._job(said, page=False))
-        panel.on(self.page.on_click, lambda said: self._job(said, page=True))
-        panel.on(self.programs.on_click, self._programs)
+        inputs.on(self.knowledge.on_click, self._save_knowledge)
+        inputs.on(self.picture.on_click, self._save_picture)
+        inputs.on(self.job.on_click, lambda event: self._save_job(event, report_only=False))
+        inputs.on(self.report.on_click, lambda event: self._save_job(event, report_only=True))
+        inputs.on(self.programs.on_click, self._save_programs)
 
     def refresh(self) -> None:
-        """Which targets there are."""
-        keys = [
-            key
-            for key in self.studio.editor.object_keys()[1:]
-            if key in self.studio.results.by_target
-        ]
-        self.panel.set_options(self.target, tuple(keys) or (NO_TARGET,))
+        """Show which targets there are."""
+        self.inputs.set_options(self.target, transferred_targets(self.context))
 
-    def _knowledge(self, said: PanelEvent) -> None:
-        place = save_knowledge(self.studio.editor)
-        said.client.send_file_download("knowledge.zip", zipped(place), save_immediately=True)
-        self._tell(place, f"nrdf check {next(place.glob('*.yaml'))}")
+    def _save_knowledge(self, event: PanelEvent) -> None:
+        folder = save_knowledge(self.context.editor)
+        event.client.send_file_download("knowledge.zip", zipped(folder), save_immediately=True)
+        self._show(folder, f"nrdf check {next(folder.glob('*.yaml'))}")
 
-    def _picture(self, said: PanelEvent) -> None:
+    def _save_picture(self, event: PanelEvent) -> None:
         def work(progress: Progress) -> None:
             progress(0, 1)
-            place = save_picture(self.studio.editor, self.studio.results)
-            content = place.read_bytes()
-            said.client.send_file_download("nrdf.png", content, save_immediately=True)
-            self._tell(place)
+            path = save_picture(self.context.editor, self.context.results)
+            content = path.read_bytes()
+            event.client.send_file_download("nrdf.png", content, save_immediately=True)
+            self._show(path)
 
-        self.studio.worker.submit("save", "drawing the picture", work)
+        self.context.worker.submit("save", "drawing the picture", work)
 
-    def _job(self, said: PanelEvent, page: bool) -> None:
+    def _save_job(self, event: PanelEvent, report_only: bool) -> None:
         name, result = self._chosen()
 
         def work(progress: Progress) -> None:
             progress(0, 1)
-            place = save_job(self.studio.editor, name, result, self.studio.origin)
-            if page:
-                content, file = (place / HTML_REPORT).read_bytes(), f"{name}.html"
+            folder = save_job(self.context.editor, name, result, self.context.origin)
+            if report_only:
+                content, file = (folder / HTML_REPORT).read_bytes(), f"{name}.html"
             else:
-                content, file = zipped(place), f"{name}-job.zip"
-            said.client.send_file_download(file, content, save_immediately=True)
-            self._tell(
-                place / HTML_REPORT if page else place, f"nrdf export {place} --format urscript"
-            )
+                content, file = zipped(folder), f"{name}-job.zip"
+            event.client.send_file_download(file, content, save_immediately=True)
+            path = folder / HTML_REPORT if report_only else folder
+            self._show(path, f"nrdf export {folder} --format urscript")
 
-        self.studio.worker.submit("save", "writing the job and its pictures", work)
+        self.context.worker.submit("save", "writing the job and its pictures", work)
 
-    def _programs(self, said: PanelEvent) -> None:
+    def _save_programs(self, event: PanelEvent) -> None:
         name, result = self._chosen()
-        place = save_programs(self.studio.editor, name, result, (self.format.value,))
+        folder = save_programs(self.context.editor, name, result, (self.format.value,))
         file = f"{name}-{self.format.value}.zip"
-        said.client.send_file_download(file, zipped(place), save_immediately=True)
-        self._tell(place)
+        event.client.send_file_download(file, zipped(folder), save_immediately=True)
+        self._show(folder)
 
     def _chosen(self) -> tuple[str, TargetResult]:
         name = self.target.value
-        return name, self.studio.results.ready(name)
+        return name, self.context.results.ready(name)
 
-    def _tell(self, place: Path, command: str = "") -> None:
-        lines = [f"Written to `{place}`."]
-        lines += [f"From here: `{command}`"] if command else []
+    def _show(self, path: Path, command: str = "") -> None:
+        lines = [f"Written to `{path}`."]
+        lines += [f"Next: `{command}`"] if command else []
         self.status.content = "  \n".join(lines)
+
+
+def transferred_targets(context: StudioContext) -> tuple[str, ...]:
+    """The targets with a result, as the options of a dropdown."""
+    keys = context.editor.object_keys()[1:]
+    return tuple(key for key in keys if key in context.results.by_target) or (NO_TARGET,)

@@ -1,4 +1,4 @@
-"""An arm on the stage, at work on one object."""
+"""A robot arm in the scene, at work on one object."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from nrdf.studio.model.playback import EVERY_PATH, FLOOR, Playback
 from nrdf.studio.scene.scene_view import ObjectView
 
 _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""From the cell's frame, z up, to the stage's directions, y up, the object's x staying x."""
-_MISSED = (215, 20, 20)
-_MISSED_SIZE = 1.2  # of a point that is not reached, in spacings
-_ROOM_M = (-0.08, 0.08)  # around the arm's frames, for its thickness
-_EVERY = 25  # moments between those that a camera is placed by
+"""From the cell's frame, z up, to the scene's, y up; the object's x stays x."""
+_UNREACHED = (215, 20, 20)
+_UNREACHED_SIZE = 1.2  # of a point that is not reached, in spacings
+_THICKNESS_M = (-0.08, 0.08)  # around the arm's frames, which have no thickness
+_EVERY = 25  # every 25th moment is enough to place the camera
 
 
 class ArmView:
-    """The arm, its tool and what they stand on; the object turns with its turntable."""
+    """The arm, its tool and what they stand on. The object turns with its turntable."""
 
     def __init__(self, object_view: ObjectView, playback: Playback) -> None:
         self.object_view, self.playback = object_view, playback
-        self._factor = object_view.scene_view.factor
+        self._factor = object_view.scene_view.units_per_m
         self._scene = object_view.scene_view.server.scene
         wxyz = quaternions_wxyz(_CELL)
         self._root = self._scene.add_frame("/arm", show_axes=False, wxyz=wxyz)
@@ -43,56 +43,58 @@ class ArmView:
                 self._tools.setdefault(shape.path, []).append(mesh)
         paintable = object_view.paintable
         self._marks = self._scene.add_point_cloud(
-            f"{object_view.path}/missed",
-            (playback.missed * self._factor).astype(np.float32),
-            np.full((len(playback.missed), 3), _MISSED, np.uint8),
-            point_size=_MISSED_SIZE * paintable.surface.spacing * self._factor,
+            f"{object_view.path}/unreached",
+            (playback.unreached * self._factor).astype(np.float32),
+            np.full((len(playback.unreached), 3), _UNREACHED, np.uint8),
+            point_size=_UNREACHED_SIZE * paintable.surface.spacing * self._factor,
             point_shape="circle",
             precision="float32",
         )
-        self._at = -1
-        self.stand(object_view.offset)
+        self._index = -1
+        self.place(object_view.offset)
 
     @property
-    def places(self) -> np.ndarray:
-        """Places (k, 3) in the scene that the arm takes up at work, its base's foot included."""
+    def occupied_points(self) -> np.ndarray:
+        """Points (k, 3) in the scene that the arm occupies at work, with the foot of its base."""
         playback = self.playback
-        at_work = playback.positions[playback.doing == "process"][::_EVERY].reshape(-1, 3)
-        around = np.array([[x, y, z] for x in _ROOM_M for y in _ROOM_M for z in _ROOM_M])
+        at_work = playback.positions[playback.motion == "process"][::_EVERY].reshape(-1, 3)
+        around = np.array(
+            [[x, y, z] for x in _THICKNESS_M for y in _THICKNESS_M for z in _THICKNESS_M]
+        )
         foot = playback.positions[0, 0] * [1.0, 1.0, 0.0]
         taken = np.concatenate([(at_work[:, None] + around).reshape(-1, 3), [foot]])
         return taken @ _CELL.T * self._factor + self._origin
 
-    def stand(self, offset: np.ndarray) -> None:
-        """Stand where the object, not turned, is at `offset` (3,) in the scene."""
+    def place(self, offset: np.ndarray) -> None:
+        """Place the arm so that the object, not turned, is at `offset` (3,) in the scene."""
         place = _CELL @ self.playback.T_cell_object[:3, 3] * self._factor
         self._object, self._origin = place, offset - place
         self._upright = _CELL @ self.playback.T_cell_object[:3, :3]
         self._root.position = tuple(self._origin)
-        self.show(max(self._at, 0))
+        self.show(max(self._index, 0))
 
-    def show(self, at: int) -> None:
+    def show(self, index: int) -> None:
         """Show the moment of that index."""
         playback = self.playback
-        angle = float(playback.turn_rad[at])
+        angle = float(playback.turntable_rad[index])
         # The turntable's axis goes through the cell's origin.
         turn = about_up(angle)
-        self.object_view.stand(self._origin + turn @ self._object, turn @ self._upright)
+        self.object_view.place(self._origin + turn @ self._object, turn @ self._upright)
         for body, frame in self._bodies.items():
-            frame.position = tuple(playback.positions[at, body] * self._factor)
-            frame.wxyz = tuple(playback.quaternions_wxyz[at, body])
+            frame.position = tuple(playback.positions[index, body] * self._factor)
+            frame.wxyz = tuple(playback.quaternions_wxyz[index, body])
         for path, tools in self._tools.items():
             for mesh in tools:
-                mesh.visible = path == playback.path[at]
-        self._at = at
+                mesh.visible = path == playback.path[index]
+        self._index = index
 
-    def see(self, visible: bool) -> None:
+    def set_visible(self, visible: bool) -> None:
         """Show or hide all but the object."""
         self._root.visible = self._marks.visible = visible
 
     def remove(self) -> None:
-        """Take the arm away, and let the object stand as it does without one."""
-        self.object_view.stand(self._origin + self._object)
+        """Remove the arm, and place the object as it is without one."""
+        self.object_view.place(self._origin + self._object)
         self._root.remove()
         self._marks.remove()
 

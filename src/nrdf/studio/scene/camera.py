@@ -1,4 +1,4 @@
-"""What a person at a camera points at: points near a ray, or inside a rectangle on the screen."""
+"""A pinhole camera, and the points that a ray or a rectangle on the screen selects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Camera:
     """A pinhole camera.
 
     position: (3,); rotation: (3, 3) from the camera's axes (x right, y down, z forward) to the
-    world's; fov_rad: vertical field of view; aspect: width over height. Places on the screen are
+    world's; fov_rad: vertical field of camera; aspect: width over height. Places on the screen are
     (0, 0) in its upper left corner to (1, 1) in its lower right one.
     """
 
@@ -29,7 +29,7 @@ class Camera:
     def of(
         position: np.ndarray, quaternion_wxyz: np.ndarray, fov_rad: float, aspect: float
     ) -> Camera:
-        """The view of a camera whose rotation is a quaternion, scalar first."""
+        """The camera of a camera whose rotation is a quaternion, scalar first."""
         w, x, y, z = quaternion_wxyz
         rotation = Rotation.from_quat([x, y, z, w]).as_matrix()
         return Camera(np.asarray(position, np.float64), rotation, fov_rad, aspect)
@@ -43,15 +43,15 @@ class Camera:
         flat = seen[:, :2] / np.maximum(depth, 1e-9)[:, None]
         return 0.5 + 0.5 * flat / [half * self.aspect, half], depth
 
-    def ray(self, place: tuple[float, float]) -> np.ndarray:
-        """Unit direction (3,) from the camera through a place on the screen."""
+    def ray(self, screen: tuple[float, float]) -> np.ndarray:
+        """Unit direction (3,) from the camera through a screen on the screen."""
         half = np.tan(self.fov_rad / 2)
-        x, y = (2 * np.asarray(place, np.float64) - 1) * [half * self.aspect, half]
+        x, y = (2 * np.asarray(screen, np.float64) - 1) * [half * self.aspect, half]
         direction = self.rotation @ np.array([x, y, 1.0])
         return np.asarray(direction / np.linalg.norm(direction))
 
 
-def hit(
+def first_hit(
     points: np.ndarray,
     normals: np.ndarray,
     origin: np.ndarray,
@@ -75,8 +75,8 @@ def hit(
     return best, float(depth[best])
 
 
-def inside(
-    view: Camera,
+def points_in_rectangle(
+    camera: Camera,
     points: np.ndarray,
     normals: np.ndarray,
     corners: tuple[tuple[float, float], tuple[float, float]],
@@ -87,25 +87,30 @@ def inside(
 
     A point is seen if it faces the camera and no other one lies before it.
     """
-    place, depth = view.project(points)
+    screen, depth = camera.project(points)
     low, high = np.minimum(*corners), np.maximum(*corners)
-    chosen = (depth > 0) & (place >= low).all(axis=1) & (place <= high).all(axis=1)
-    return chosen if through else chosen & visible(view, points, normals, spacing)
+    chosen = (depth > 0) & (screen >= low).all(axis=1) & (screen <= high).all(axis=1)
+    return chosen if through else chosen & visible_points(camera, points, normals, spacing)
 
 
-def visible(view: Camera, points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
+def visible_points(
+    camera: Camera, points: np.ndarray, normals: np.ndarray, spacing: float
+) -> np.ndarray:
     """Which points (n,) of a surface face the camera with no other one before them.
 
     A depth image whose cells are as wide as `spacing` at the nearest point's depth.
     """
-    place, depth = view.project(points)
-    facing = np.einsum("na,na->n", normals, view.position - points) > 0
+    screen, depth = camera.project(points)
+    facing = np.einsum("na,na->n", normals, camera.position - points) > 0
     ahead = depth > 0
     if not ahead.any():
         return ahead
-    half = np.tan(view.fov_rad / 2)
+    half = np.tan(camera.fov_rad / 2)
     cell = 1.5 * spacing / (2 * half * np.median(depth[ahead]))
-    column, row = np.floor(place[:, 0] * view.aspect / cell), np.floor(place[:, 1] / cell)
+    column, row = (
+        np.floor(screen[:, 0] * camera.aspect / cell),
+        np.floor(screen[:, 1] / cell),
+    )
     key = np.where(ahead, column * 1_000_003 + row, np.inf)
     pixel = np.unique(key, return_inverse=True)[1]
     nearest = np.full(int(pixel.max()) + 1, np.inf)

@@ -1,4 +1,4 @@
-"""The colours of an object's points: regions, confidence, likeness."""
+"""The colours of an object's points: regions, confidence, similarity."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from nrdf.viz.palette import NO_REGION, SEVERAL_REGIONS, confidence_scale, similarity_scale
 
-COLOURINGS = ("regions", "confidence", "likeness")
-"""What the colours of points may show."""
+COLOURINGS = ("regions", "confidence", "similarity")
+"""What the colours of points can show."""
 BARE = np.array(NO_REGION) * 255
 
 
@@ -41,7 +41,7 @@ def confidence_colours(count: int, regions: Sequence[tuple[np.ndarray, np.ndarra
 
 
 def similarity_colours(distance: np.ndarray, width: float) -> np.ndarray:
-    """Colours (n, 3) uint8 by how alike descriptors are: yellow where the same, blue where not.
+    """Colours (n, 3) uint8 by the similarity of descriptors: yellow where equal, blue where not.
 
     distance: (n,) descriptor distances; width: the distance at which the similarity is 1/e.
     """

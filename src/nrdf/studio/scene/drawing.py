@@ -1,4 +1,4 @@
-"""What an object looks like: its points' colours, the lines on it, and what stands above it."""
+"""What is drawn of an object: the colours of its points, its lines, its label, its arrow."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.scene.colours import confidence_colours, painted_colours
 
 _DEEP, _PALE = 0.5, 0.62
-"""Shares of a region's colour in the lines on it, and in the region where there are lines."""
+"""Shares of a region's colour in the lines on it, and in the region where found are lines."""
 
 
-def found(results: ResultCache, key: str, region: str) -> np.ndarray | None:
-    """Indices (k,) of a target's points that were found to be in a region, None where none were."""
+def found_indices(results: ResultCache, key: str, region: str) -> np.ndarray | None:
+    """Indices (k,) of a target's points that were found to be in a region, None for none."""
     result = results.by_target.get(key)
     if result is None or region not in result.transfer_result.regions:
         return None
@@ -28,22 +28,24 @@ def found(results: ResultCache, key: str, region: str) -> np.ndarray | None:
 def colours_of(
     editor: Editor, results: ResultCache, key: str, by_confidence: bool = False
 ) -> np.ndarray:
-    """Colours (k, 3) uint8 of an object's shown points by their regions; a target's also by their
-    confidence, which is all there is to see `by_confidence`."""
+    """Colours (k, 3) uint8 of an object's shown points by their regions.
+
+    On a target they are paler where the confidence is lower; `by_confidence` shows it alone.
+    """
     paintable, target = editor.paintable(key), editor.target(key)
     drawn: list[tuple[tuple[int, int, int], np.ndarray, np.ndarray | None]] = []
     for region in editor.document.regions:
-        there = found(results, key, region.name)
+        found = found_indices(results, key, region.name)
         corrected = target is not None and region.name in target.corrected
         confidence = None
         if target is not None and not corrected:
-            if there is None:
+            if found is None:
                 continue
             match = results.by_target[key].transfer_result.regions[region.name].match
             everywhere = np.zeros(len(paintable.cloud))
-            everywhere[there] = match.confidence
+            everywhere[found] = match.confidence
             confidence = paintable.to_shown(everywhere)
-        indices = np.flatnonzero(editor.mask(key, region.name, there))
+        indices = np.flatnonzero(editor.mask(key, region.name, found))
         own = None if confidence is None else confidence[indices]
         drawn.append((region.colour, indices, own))
     count = len(paintable.points)
@@ -56,7 +58,7 @@ def colours_of(
 def lines_of(
     editor: Editor, results: ResultCache, key: str
 ) -> dict[str, tuple[Sequence[np.ndarray], np.ndarray]]:
-    """The lines on an object's regions: name to places, each (m, 3), m, and a colour (3,)."""
+    """The lines on an object's regions: name to (points, each (m, 3), m; colour (3,))."""
     colours = {r.name: _DEEP * np.array(r.colour) for r in editor.document.regions}
     if key != REFERENCE:
         result = results.by_target.get(key)
@@ -71,14 +73,14 @@ def lines_of(
 
 
 def title_of(editor: Editor, results: ResultCache, key: str) -> str:
-    """What stands above an object: its name, and what a person should look at."""
+    """The label of an object: its name, and the regions that a person should check."""
     if key == REFERENCE:
         reference = editor.document.reference
-        return "" if reference is None else f"{reference.name}, taught here"
+        return "" if reference is None else f"{reference.name} (reference)"
     result = results.by_target.get(key)
     if result is None or not result.uncertain_regions:
         return key
-    return f"{key}: look at {', '.join(result.uncertain_regions)}"
+    return f"{key}: check {', '.join(result.uncertain_regions)}"
 
 
 def direction_of(editor: Editor, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:

@@ -10,8 +10,7 @@ _TICK_S = 0.05
 
 
 class Player:
-    """Calls `advance(seconds)` while it plays, from a thread of its own; it goes on as long as that
-    returns True."""
+    """Calls `advance(seconds)` while it plays, until that returns False, in a thread of its own."""
 
     def __init__(self, advance: Callable[[float], bool]) -> None:
         self.speed = 1.0
@@ -22,15 +21,15 @@ class Player:
 
     @property
     def playing(self) -> bool:
-        """Whether time goes on."""
+        """Whether it plays."""
         return self._playing
 
     def play(self) -> None:
-        """Let time go on."""
+        """Start to play."""
         self._set(playing=True)
 
     def pause(self) -> None:
-        """Let time stand."""
+        """Pause."""
         self._set(playing=False)
 
     def stop(self) -> None:

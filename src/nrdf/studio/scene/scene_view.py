@@ -1,4 +1,4 @@
-"""The objects in the browser: side by side on one floor, under one camera."""
+"""The objects in the browser: side by side on one floor, seen by one camera."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ import viser
 
 from nrdf.geometry.frames import quaternions_wxyz, unit_vectors
 from nrdf.studio.model.paintable_cloud import PaintableCloud
-from nrdf.studio.scene.camera import Camera, hit
+from nrdf.studio.scene.camera import Camera, first_hit
 
 FOV_RAD = np.radians(48.0)
-_FROM = np.array([0.86, 0.52, 0.34])
-"""Where the camera stands, seen from the objects: before them, above, to their right."""
-_FROM_BESIDE = np.array([0.42, 0.36, 0.83])
-"""The same where an arm stands before the object."""
-_ROOM = 1.06  # times the distance at which all is just seen
+_FRONT = np.array([0.86, 0.52, 0.34])
+"""Direction from the objects to the camera: front, above, right."""
+_RIGHT = np.array([0.42, 0.36, 0.83])
+"""The same where an arm stands in front of the object."""
+_MARGIN = 1.06  # of the camera's distance, in distances at which everything is just seen
 _ABOVE = 0.14  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
 _SIZE = 1.38  # of a point, in spacings
 _LIFT = 1.4  # of lines above the surface, in spacings
 _LIGHT = np.array([0.62, 0.70, 0.35])
-"""Where the light comes from: front, above, right."""
-_DARKEST = 0.58  # share of its colour that a point has whose side faces away from the light
+"""Direction to the light: front, above, right."""
+_DARKEST = 0.58  # brightness of a point that faces away from the light
 
 
 class ObjectView:
-    """A paintable on the stage: where it stands, and what is drawn of it."""
+    """One object in the scene: its pose, and what is drawn of it."""
 
     def __init__(
         self, scene_view: SceneView, key: str, number: int, paintable: PaintableCloud
@@ -41,19 +41,19 @@ class ObjectView:
         self.frame = scene.add_frame(self.path, show_axes=False)
         self.points = scene.add_point_cloud(
             f"{self.path}/points",
-            (paintable.points * scene_view.factor).astype(np.float32),
+            (paintable.points * scene_view.units_per_m).astype(np.float32),
             np.full((len(paintable.points), 3), 200, np.uint8),
-            point_size=_SIZE * paintable.surface.spacing * scene_view.factor,
+            point_size=_SIZE * paintable.surface.spacing * scene_view.units_per_m,
             point_shape="circle",
             point_shading="flat",
             precision="float32",
         )
-        size = (paintable.high - paintable.low) * scene_view.factor
-        # Nothing to see: what a drag that paints must begin on. Only lines, for slow renderers.
-        self.ground = scene.add_box(
-            f"{self.path}/ground",
+        size = (paintable.high - paintable.low) * scene_view.units_per_m
+        # Invisible: drags that paint must begin on something. Only lines, for slow renderers.
+        self.drag_box = scene.add_box(
+            f"{self.path}/drag_box",
             dimensions=tuple(1.02 * size),
-            position=tuple((paintable.low + paintable.high) / 2 * scene_view.factor),
+            position=tuple((paintable.low + paintable.high) / 2 * scene_view.units_per_m),
             wireframe=True,
             flat_shading=False,
             opacity=0.0,
@@ -64,7 +64,7 @@ class ObjectView:
         self.label = scene.add_label(
             f"{self.path}/label",
             key,
-            position=tuple(self.top * scene_view.factor + np.array([0.0, _ABOVE, 0.0])),
+            position=tuple(self.top * scene_view.units_per_m + np.array([0.0, _ABOVE, 0.0])),
             anchor="bottom-center",
         )
         self._lines: list[viser.SceneNodeHandle] = []
@@ -72,51 +72,48 @@ class ObjectView:
 
     @property
     def corners(self) -> np.ndarray:
-        """The corners (8, 3) of the object's bounding box in the scene, room for the label above
-        included."""
-        low, high = (
-            self.paintable.low * self.scene_view.factor,
-            self.paintable.high * self.scene_view.factor,
-        )
+        """Corners (8, 3) of the object's bounding box in the scene, with the label above it."""
+        scale = self.scene_view.units_per_m
+        low, high = self.paintable.low * scale, self.paintable.high * scale
         high[1] += _ABOVE
         choice = np.array(list(product((False, True), repeat=3)))
         return np.where(choice, high, low) @ self._rotation.T + self.offset
 
     @property
     def top(self) -> np.ndarray:
-        """The place (3,) over the object's middle, at its highest, m."""
+        """The point (3,) above the middle of the object, at its full height, m."""
         middle = (self.paintable.low + self.paintable.high) / 2
         return np.array([middle[0], self.paintable.high[1], middle[2]])
 
-    def stand(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
-        """Move the object; offset (3,) in the scene, rotation (3, 3) from its own frame."""
+    def place(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
+        """Move the object: offset (3,) in the scene, rotation (3, 3) from its own frame to it."""
         self.offset, self._rotation = offset, np.eye(3) if rotation is None else rotation
         self.frame.position = tuple(offset)
         self.frame.wxyz = tuple(quaternions_wxyz(self._rotation))
 
-    def paint(self, colours: np.ndarray) -> None:
-        """Colours (k, 3) uint8 of the shown points, which are shaded here."""
+    def set_colours(self, colours: np.ndarray) -> None:
+        """Set the colours (k, 3) uint8 of the shown points; shading is added here."""
         facing = 0.5 + 0.5 * self.paintable.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
         shade = _DARKEST + (1 - _DARKEST) * facing
         self.points.colors = (colours * shade[:, None]).astype(np.uint8)
 
-    def let_drag(self, dragged: Callable[..., Any] | None) -> None:
-        """Who is told of drags that begin on the object; the camera, where None is."""
-        if (dragged is not None) == self.ground.visible:
+    def set_drag_callback(self, callback: Callable[..., Any] | None) -> None:
+        """Call this for drags that begin on the object; None gives them to the camera."""
+        if (callback is not None) == self.drag_box.visible:
             return
-        self.ground.visible = dragged is not None
-        if dragged is None:
-            self.ground.remove_drag_callback()
+        self.drag_box.visible = callback is not None
+        if callback is None:
+            self.drag_box.remove_drag_callback()
         else:
-            self.ground.on_drag(dragged)
+            self.drag_box.on_drag(callback)
 
-    def name(self, text: str) -> None:
-        """What stands above the object."""
+    def set_label(self, text: str) -> None:
+        """Set the text above the object."""
         self.label.text = text
 
     def draw_lines(self, lines: Mapping[str, tuple[Sequence[np.ndarray], np.ndarray]]) -> None:
-        """Lines by name, each (arrays (m, 3), m; colour (3,)), in place of all earlier ones."""
-        scene, factor = self.scene_view.server.scene, self.scene_view.factor
+        """Draw lines by name in place of all earlier ones, each (arrays (m, 3), m; colour (3,))."""
+        scene, factor = self.scene_view.server.scene, self.scene_view.units_per_m
         for handle in self._lines:
             handle.remove()
         self._lines.clear()
@@ -135,18 +132,18 @@ class ObjectView:
             self._lines.append(handle)
 
     def draw_arrow(self, name: str, start: np.ndarray | None, stop: np.ndarray | None) -> None:
-        """An arrow from one place (3,) to another, m, or none."""
+        """Draw an arrow from one point (3,) to another, m, or remove it."""
         if name in self._arrows:
             self._arrows.pop(name).remove()
         if start is None or stop is None or np.linalg.norm(stop - start) < 1e-6:
             return
-        factor = self.scene_view.factor
+        factor = self.scene_view.units_per_m
         lift = 2 * self.paintable.surface.spacing
         ends = np.array([[start, stop]])
-        at = int(np.argmin(np.linalg.norm(self.paintable.points - start, axis=1)))
+        near = int(np.argmin(np.linalg.norm(self.paintable.points - start, axis=1)))
         self._arrows[name] = self.scene_view.server.scene.add_arrows(
             f"{self.path}/{name}",
-            (ends + lift * self.paintable.normals[at]) * factor,
+            (ends + lift * self.paintable.normals[near]) * factor,
             (20, 20, 24),
             shaft_radius=0.008,
             head_radius=0.022,
@@ -155,22 +152,22 @@ class ObjectView:
 
     def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[int, float] | None:
         """The shown point that a ray of the scene meets first, and the depth in the scene."""
-        found = hit(
+        found = first_hit(
             self.paintable.points,
             self.paintable.normals,
-            (origin - self.offset) @ self._rotation / self.scene_view.factor,
+            (origin - self.offset) @ self._rotation / self.scene_view.units_per_m,
             direction @ self._rotation,
             self.paintable.surface.spacing,
         )
-        return None if found is None else (found[0], found[1] * self.scene_view.factor)
+        return None if found is None else (found[0], found[1] * self.scene_view.units_per_m)
 
-    def view(self, view: Camera) -> Camera:
+    def camera(self, camera: Camera) -> Camera:
         """A camera of the scene as the object sees it, m."""
-        position = (view.position - self.offset) @ self._rotation / self.scene_view.factor
-        return Camera(position, self._rotation.T @ view.rotation, view.fov_rad, view.aspect)
+        position = (camera.position - self.offset) @ self._rotation / self.scene_view.units_per_m
+        return Camera(position, self._rotation.T @ camera.rotation, camera.fov_rad, camera.aspect)
 
     def remove(self) -> None:
-        """Take the object and all that is drawn of it away."""
+        """Remove the object and all that is drawn of it."""
         self.frame.remove()
 
     def _lifted(self, line: np.ndarray) -> np.ndarray:
@@ -179,70 +176,72 @@ class ObjectView:
 
 
 class SceneView:
-    """All objects. factor: scene units for a metre, such that the reference is about 1 long."""
+    """All objects. units_per_m: scene units a metre, such that the reference is about 1 long."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.server = server
         self.objects: dict[str, ObjectView] = {}
-        self.factor = 1.0
+        self.units_per_m = 1.0
         self._made = 0
         server.scene.set_up_direction("+y")
         server.initial_camera.fov = FOV_RAD
 
-    def clear(self, factor: float) -> None:
-        """Take everything away."""
+    def clear(self, units_per_m: float) -> None:
+        """Remove every object, and set the scale."""
         for object_view in self.objects.values():
             object_view.remove()
         self.objects.clear()
-        self.factor = factor
+        self.units_per_m = units_per_m
 
     def add(self, key: str, paintable: PaintableCloud) -> ObjectView:
-        """Put an object beside the others."""
+        """Add an object arm_points the others."""
         self._made += 1
         object_view = ObjectView(self, key, self._made, paintable)
         self.objects[key] = object_view
         return object_view
 
     def remove(self, key: str) -> None:
-        """Take an object away."""
+        """Remove an object."""
         self.objects.pop(key).remove()
 
     def arrange(self, shown: Sequence[str]) -> None:
-        """Let the objects `shown` stand in a row, to the right of each other as seen from the
-        front, and hide the others."""
+        """Place the objects `shown` in a row, to the right of each other as seen from the front,
+        and hide the others."""
         paintables = [object_view.paintable for object_view in self.objects.values()]
         if not paintables:
             return
-        gap = _GAP * max(float((b.high - b.low).max()) for b in paintables) * self.factor
+        gap = _GAP * max(float((b.high - b.low).max()) for b in paintables) * self.units_per_m
         right = 0.0
         for key, object_view in self.objects.items():
             object_view.frame.visible = key in shown
             if key not in shown:
                 continue
             paintable = object_view.paintable
-            low, high = paintable.low * self.factor, paintable.high * self.factor
-            # +Z is the object's right-hand side: to the left of who stands before it.
-            object_view.stand(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
+            low, high = paintable.low * self.units_per_m, paintable.high * self.units_per_m
+            # +Z is the object's right-hand side: on the left when seen from the front.
+            object_view.place(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
 
     def camera(
-        self, shown: Sequence[str], aspect: float, beside: np.ndarray | None = None
+        self, shown: Sequence[str], aspect: float, arm_points: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Where a camera with that width over height stands to see the objects `shown` from the
-        front, or with places (k, 3) beside them from their right, and what it looks at."""
+        """Position (3,) and target (3,) of a camera that sees the objects `shown` from the front.
+
+        aspect: width over height. With points (k, 3) of an arm it sees them, too, from the right.
+        """
         object_views = [object_view for key, object_view in self.objects.items() if key in shown]
-        more = np.zeros((0, 3)) if beside is None else beside
+        more = np.zeros((0, 3)) if arm_points is None else arm_points
         corners = np.concatenate([more, *(object_view.corners for object_view in object_views)])
         if not len(corners):
             corners = np.array([[-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]])
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        toward = unit_vectors(_FROM if beside is None else _FROM_BESIDE)
+        toward = unit_vectors(_FRONT if arm_points is None else _RIGHT)
         right = unit_vectors(np.cross([0.0, 1.0, 0.0], toward))
         axes = np.stack([right, np.cross(toward, right), toward])
         seen = (corners - middle) @ axes.T
         half = np.tan(FOV_RAD / 2) * np.array([aspect, 1.0])
         away = float((np.abs(seen[:, :2]) / half + seen[:, 2:]).max())
-        return middle + _ROOM * away * toward, middle
+        return middle + _MARGIN * away * toward, middle
 
     def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[ObjectView, int] | None:
         """The object and its shown point that a ray meets first."""

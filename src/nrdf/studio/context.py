@@ -1,0 +1,270 @@
+"""What mouse, arm simulation and panels share: the session, its results, the scene, the selection.
+
+They import this module; `nrdf.studio.app` imports them.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import viser
+
+from nrdf.errors import NrdfError
+from nrdf.studio.model.computing import (
+    ChildProcessComputing,
+    CorrespondenceFeatures,
+    LocalComputing,
+)
+from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.result_cache import ResultCache
+from nrdf.studio.model.session import Session
+from nrdf.studio.model.teaching import ORIGIN
+from nrdf.studio.model.uploads import check_upload, shown_name
+from nrdf.studio.model.worker import Progress, Worker
+from nrdf.studio.scene.colours import COLOURINGS, similarity_colours
+from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.studio.scene.scene_view import ObjectView, SceneView
+
+if TYPE_CHECKING:
+    from nrdf.io.cloud import PointCloud
+
+log = logging.getLogger(__name__)
+
+_PLAN_AFTER_S = 0.4
+
+
+class StudioContext(ABC):
+    """The state of a studio, its drawing and its background work; the same for every browser.
+
+    server: a viser server with nothing on it yet. computing: what plans and transfers, for objects
+    of one of `categories`. origin: what reports say of how they were made.
+    """
+
+    worker: Worker
+    """Runs plans, transfers and uploads in the background."""
+
+    def __init__(
+        self,
+        session: Session,
+        server: viser.ViserServer,
+        computing: LocalComputing | ChildProcessComputing,
+        categories: Sequence[str],
+        origin: Mapping[str, Any],
+    ) -> None:
+        self.server, self.categories, self.origin = server, tuple(categories), origin
+        self.editor = Editor(session)
+        self.results = ResultCache(self.editor, computing)
+        self.scene = SceneView(server)
+        self.lock = threading.RLock()
+        self.region, self.step, self.radius_m = "", 0, 0.05
+        self.colouring, self.similarity_width = COLOURINGS[0], 0.15
+        self.shown_target: str | None = None
+        """The one target that is shown beside the reference, None for all."""
+        self._distances: dict[str, np.ndarray] = {}
+        self._features: CorrespondenceFeatures | None = None
+        self._picked_point = self._uploads = 0
+
+    # --- what `nrdf.studio.app.Studio` adds
+
+    @abstractmethod
+    def restore(self) -> None:
+        """Show the session from the beginning, and compute what it needs."""
+
+    @abstractmethod
+    def sync(self) -> None:
+        """Bring scene and panel to what the document says."""
+
+    @abstractmethod
+    def visible_objects(self) -> list[str]:
+        """The keys of the objects that are to be seen."""
+
+    @abstractmethod
+    def arrange(self) -> None:
+        """Put the visible objects side by side, and let every camera see all of them."""
+
+    @abstractmethod
+    def refresh_panel(self) -> None:
+        """Show in the panel what the document, the plans and the results say."""
+
+    @abstractmethod
+    def show_error(self, text: str) -> None:
+        """Show in the panel what went wrong last; "" removes it."""
+
+    # --- drawing
+
+    def draw(self) -> None:
+        """Draw colours, lines, labels and the direction arrow of all objects."""
+        with self.lock, self.server.atomic():
+            for key, object_view in self.scene.objects.items():
+                self.draw_colours(object_view)
+                by_similarity = self._shows_similarity(object_view)
+                lines = {} if by_similarity else lines_of(self.editor, self.results, key)
+                object_view.draw_lines(lines)
+                object_view.set_label(title_of(self.editor, self.results, key))
+            if REFERENCE in self.scene.objects:
+                ends = direction_of(self.editor, self.region, self.step)
+                self.scene.objects[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
+
+    def draw_colours(self, object_view: ObjectView) -> None:
+        """Draw the colours of one object."""
+        if self._shows_similarity(object_view):
+            distances = self._distances[object_view.key]
+            object_view.set_colours(similarity_colours(distances, self.similarity_width))
+        else:
+            by_confidence = self.colouring == "confidence"
+            colours = colours_of(self.editor, self.results, object_view.key, by_confidence)
+            object_view.set_colours(colours)
+
+    def recolour(self, colouring: str, width: float) -> None:
+        """Colour by something else, or by another width of similarity.
+
+        Raises NrdfError for similarity where no point has been picked.
+        """
+        with self.lock:
+            if colouring == "similarity" and not self._distances:
+                raise NrdfError("take 'Similarity' and click a point of the reference first")
+            self.colouring, self.similarity_width = colouring, width
+            self.draw()
+
+    def descriptor_distances(self, key: str) -> np.ndarray | None:
+        """The descriptor distances of an object's shown points (k,) to the picked point, if any."""
+        return self._distances.get(key)
+
+    def regions_changed(self) -> None:
+        """Drop the lines that no longer hold, and plan new ones."""
+        if self.colouring == "similarity":
+            self.colouring = COLOURINGS[0]
+        self.draw()
+        self.refresh_panel()
+        self.plan()
+        current = self.results.is_current
+        targets = self.editor.document.targets
+        if any(t.corrected and not current(t.object.name) for t in targets):
+            self.transfer(_PLAN_AFTER_S)
+
+    def _shows_similarity(self, object_view: ObjectView) -> bool:
+        return self.colouring == "similarity" and object_view.key in self._distances
+
+    def _forget_similarity(self) -> None:
+        self._distances.clear()
+        self._features = None
+
+    # --- work in the background
+
+    def plan(self, delay_s: float = _PLAN_AFTER_S) -> None:
+        """Plan on the reference what is not planned yet."""
+        document = self.editor.document
+        self._submit("plan", "planning on the reference", delay_s,
+                     lambda progress: self.results.make_plans(document, progress))  # fmt: skip
+
+    def transfer(self, delay_s: float = 0.0) -> None:
+        """Transfer the processes to the targets."""
+        document = self.editor.document
+        self._submit("transfer", "finding regions and planning tool paths", delay_s,
+                     lambda progress: self.results.transfer(document, progress))  # fmt: skip
+
+    def read(
+        self, file: Any, category: str, unit: str | None, then: Callable[[PointCloud], None]
+    ) -> None:
+        """Read a file that a browser sent, and give its cloud to `then`.
+
+        Raises CloudError for a file of another type, or too large a one.
+        """
+        name, content = file.name, file.content
+        check_upload(name, len(content))
+
+        def work(progress: Progress) -> None:
+            cloud = self.results.read(name, content, category, unit, progress)
+            with self.lock:
+                then(cloud)
+
+        self._uploads += 1  # each is a job of its own
+        self._submit(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
+
+    def compare(self, key: str, index: int) -> None:
+        """Colour every object by the similarity of its points to a shown point of the reference.
+
+        The first time in the background; at once for every point that is picked after it.
+        """
+        if key != REFERENCE:
+            raise NrdfError("pick a point of the reference: similar points are coloured everywhere")
+        self._picked_point = index
+        if self._features is not None and self.colouring == "similarity":
+            self._distances = self._features.distances(index)
+            for object_view in self.scene.objects.values():
+                self.draw_colours(object_view)
+            return
+        document = self.editor.document
+
+        def work(progress: Progress) -> None:
+            features = self.results.correspondence_features(document, progress)
+            with self.lock:
+                self._features = features
+                self._distances = features.distances(self._picked_point)
+                self.colouring = "similarity"
+
+        if self._features is not None or not self.worker.has_job("similarity"):
+            self._features = None
+            self._submit("similarity", "comparing descriptors", 0.0, work)
+
+    def _submit(
+        self, kind: str, what: str, delay_s: float, work: Callable[[Progress], None]
+    ) -> None:
+        """Work in the background, then show what it has made, however it ended."""
+
+        def work_and_show(progress: Progress) -> None:
+            try:
+                work(progress)
+            finally:
+                with self.lock:
+                    if kind != "similarity":
+                        self._features = None  # they are of the objects before
+                    self.draw()
+                    self.refresh_panel()
+
+        self.worker.submit(kind, what, work_and_show, delay_s)
+
+    # --- messages
+
+    def need_region(self) -> None:
+        """Raises NrdfError where no region is selected."""
+        if self.editor.document.region(self.region) is None:
+            raise NrdfError("there is no region yet: press 'New region' in step 2 first")
+
+    @contextmanager
+    def reporting_errors(self) -> Iterator[None]:
+        """Hold the lock during a block, and show on the page what goes wrong in it."""
+        with self.lock:
+            self.show_error("")
+            try:
+                yield
+            except NrdfError as error:
+                self.refresh_panel()
+                self.notify("That did not work", str(error))
+            except Exception as error:
+                log.exception("internal error of the studio")
+                self.notify("Internal error of nrdf", f"{type(error).__name__}: {error}")
+
+    def notify(self, title: str, text: str, bad: bool = True) -> None:
+        """Notify every open page; what is bad also stays in the panel until the next input."""
+        text = text.removeprefix(f"{ORIGIN}: ")
+        if bad:
+            self.show_error(f"⚠ **{title}**: {text}")
+        for client in self.server.get_clients().values():
+            client.add_notification(
+                title, text, color="red" if bad else "teal", auto_close_seconds=15 if bad else 6
+            )
+
+    def notify_end(self, what: str, error: str) -> None:
+        """Notify of work in the background that was cancelled or has failed."""
+        if error == "cancelled":
+            self.notify(what, "cancelled; what was finished is kept", bad=False)
+        elif error:
+            self.notify(what, error)

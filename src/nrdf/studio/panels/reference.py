@@ -1,0 +1,97 @@
+"""Step 1: the object that the process is taught on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from nrdf.bundled import KNOWLEDGE, REFERENCE
+from nrdf.geometry.units import METRES
+from nrdf.process.bound_knowledge import read_bound_knowledge
+from nrdf.studio.context import StudioContext
+from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
+from nrdf.studio.panels.inputs import Inputs, PanelEvent
+
+if TYPE_CHECKING:
+    from nrdf.io.cloud import PointCloud
+
+AS_IN_FILE = "as in the file"
+WITH_KNOWLEDGE = "chair with its five processes"
+
+
+class ReferenceTab:
+    """Load a reference: one of the package's, or a file."""
+
+    def __init__(self, context: StudioContext, inputs: Inputs) -> None:
+        self.context, self.inputs = context, inputs
+        gui, known = context.server.gui, context.categories
+        first = "chair" if "chair" in known else known[0]
+        gui.add_markdown(
+            "Open the reference: the object that the process is taught on. It faces +X, +Y is up."
+        )
+        self.bundled = gui.add_dropdown("Bundled chair", (*BUNDLED, WITH_KNOWLEDGE))
+        self.open = gui.add_button("Open the bundled chair", icon=None)
+        gui.add_markdown("Or a scan or mesh of your own:")
+        self.category = gui.add_dropdown("Category", known, initial_value=first)
+        self.unit = gui.add_dropdown("Unit", (AS_IN_FILE, *METRES))
+        self.upload = gui.add_upload_button(
+            "Load a file …", mime_type=",".join(ENDINGS), hint=f"{', '.join(ENDINGS)}"
+        )
+        self.status = gui.add_markdown("")
+        self.new = gui.add_button("New session", color="gray")
+        inputs.on(self.open.on_click, lambda _: self._open())
+        inputs.on(self.upload.on_upload, lambda event: self._load(event.value))
+        inputs.on(self.new.on_click, self._ask)
+
+    def refresh(self) -> None:
+        """Show the reference."""
+        document = self.context.editor.document
+        reference = document.reference
+        if reference is None:
+            self.status.content = "No reference is open."
+            return
+        size = reference.cloud.points.max(axis=0) - reference.cloud.points.min(axis=0)
+        sides = " × ".join(f"{1e3 * side:.0f}" for side in size)
+        self.status.content = (
+            f"**{reference.name}**, category {document.category}: {len(reference.cloud)} points, "
+            f"{sides} mm. Every change is saved at once."
+        )
+
+    def _open(self) -> None:
+        name, editor = self.bundled.value, self.context.editor
+        if name == WITH_KNOWLEDGE:
+            editor.open_knowledge(REFERENCE, read_bound_knowledge(KNOWLEDGE))
+        else:
+            editor.open_reference(name, bundled(name), "chair")
+        self.context.restore()
+
+    def _load(self, file: Any) -> None:
+        category = self.category.value
+
+        def opened(cloud: PointCloud) -> None:
+            self.context.editor.open_reference(file.name, cloud, category)
+            self.context.restore()
+
+        self.context.read(file, category, unit_of(self.unit.value), opened)
+
+    def _ask(self, event: PanelEvent) -> None:
+        gui = self.context.server.gui
+        with gui.add_modal("New session?") as modal:
+            gui.add_markdown(
+                "Reference, regions, processes and targets are removed. *Undo* (Ctrl+Z) brings "
+                "them back as long as the studio runs; what was saved in step 5 stays."
+            )
+            yes = gui.add_button("New session", color="red")
+            no = gui.add_button("Keep this session", color="gray")
+
+        def start(_: Any) -> None:
+            modal.close()
+            self.context.editor.new_session()
+            self.context.restore()
+
+        self.inputs.on(yes.on_click, start)
+        self.inputs.on(no.on_click, lambda _: modal.close())
+
+
+def unit_of(shown: str) -> str | None:
+    """The unit that was chosen, None for the file's own."""
+    return None if shown == AS_IN_FILE else shown
