@@ -48,8 +48,9 @@ class Playback:
     """A job on an arm, in the cell's frame (`nrdf.robot.model.cell.Placement`), about every 40 ms.
 
     times: (t,), s. At each: path (t,), the number of the tool path; motion (t,), a
-    `nrdf.robot.planning.program.ActionKind`; line (t,), -1 between lines; force_n (t,); turntable_rad
-    (t,); positions (t, b, 3) and quaternions_wxyz (t, b, 4) of the bodies. T_cell_object: (4, 4),
+    `nrdf.robot.planning.program.ActionKind`; line (t,), -1 between lines; force_n (t,);
+    turntable_rad (t,); positions (t, b, 3) and quaternions_wxyz (t, b, 4) of the bodies.
+    T_cell_object: (4, 4),
     of the object at turntable angle 0. unreached: (k, 3), waypoints that are not reached, in the
     object's frame, m. report: the content of report.json.
     """
