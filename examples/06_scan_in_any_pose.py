@@ -7,14 +7,15 @@ import numpy as np
 
 import nrdf
 from nrdf.bundled import bundled_chair
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.scans.simulate import ScanSettings, simulate_scan
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import tessellate
 
 # Three depth cameras around a chair of 0.9 m that stands on a floor, z up, turned by 2 rad.
 mesh = tessellate(get_family("chair").member(1_000_003))  # vertices (v, 3), faces (f, 3)
-pose = Similarity(upright(up_axis("z")) @ about_up(2.0), np.array([4.0, -1.0, 0.4]), 0.9)
+pose = Similarity(upright(up_axis("z")) @ rotation_about_up(2.0), np.array([4.0, -1.0, 0.4]), 0.9)
 settings = ScanSettings(views=3, noise=0.001, floor=True)
 seen = simulate_scan(mesh.vertices, mesh.faces, settings, np.random.default_rng(0), pose)
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import DataError
-from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.canonical import canonical_transform, rotation_about_up
 from nrdf.geometry.mesh import outer_skin
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.regions.match import Match
@@ -133,7 +133,7 @@ def meshes(folder: Path, category: str, split: str = "test") -> Iterator[Item]:
 def random_pose(rng: np.random.Generator) -> Similarity:
     """Any yaw, z up; scale 0.1 to 1000, log-uniform; offset of up to ten scales."""
     scale = float(10 ** rng.uniform(-1, 3))
-    turn = upright(UP) @ about_up(rng.uniform(0, 2 * np.pi))
+    turn = upright(UP) @ rotation_about_up(rng.uniform(0, 2 * np.pi))
     return Similarity(turn, scale * rng.uniform(-10, 10, 3), scale)
 
 

@@ -6,7 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.scans.simulate import ScanSettings, SimulatedScan, simulate_scan
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import Tessellation, tessellate
@@ -20,7 +21,7 @@ def triangles(category: str, seed: int) -> Tessellation:
 
 
 def pose(yaw: float, scale: float = 1.0, offset=(0.0, 0.0, 0.0)) -> Similarity:
-    return Similarity(upright(UP) @ about_up(yaw), np.array(offset, float), scale)
+    return Similarity(upright(UP) @ rotation_about_up(yaw), np.array(offset, float), scale)
 
 
 def scan_of(

@@ -11,7 +11,8 @@ import pytest
 
 from builders.scenes import pose, scan_of, yaw_error
 from nrdf import cli
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import PointCloud, read_cloud, write_cloud
 from nrdf.io.ply import read_header, read_scalars
 from nrdf.io.result_folder import MANIFEST
@@ -134,7 +135,7 @@ def test_up_may_begin_with_a_dash(files, tmp_path, capsys):
     assert cli._with_axes_joined(["align", "--up", "-y", "--out", "-z"]) == [
         "align", "--up=-y", "--out", "-z"
     ]  # fmt: skip
-    turned = Similarity(upright(up_axis("-x")) @ about_up(0.3), np.zeros(3), 1.0)
+    turned = Similarity(upright(up_axis("-x")) @ rotation_about_up(0.3), np.zeros(3), 1.0)
     cloud = read_cloud(files / "ref.ply")
     write_cloud(tmp_path / "t.ply", PointCloud(turned.to_scan(cloud.points)))
     out = tmp_path / "a"

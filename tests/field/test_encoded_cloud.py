@@ -7,14 +7,15 @@ import pytest
 import torch
 
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset, oriented_features
-from nrdf.geometry.similarity import Similarity, about_up
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 
 
 @pytest.fixture
 def encoded() -> EncodedCloud:
     """Twelve points in a row, every second one in use."""
-    pose = Similarity(about_up(0.5), np.array([3.0, -1.0, 2.0]), 4.0)
+    pose = Similarity(rotation_about_up(0.5), np.array([3.0, -1.0, 2.0]), 4.0)
     canonical = np.stack([np.linspace(-0.5, 0.5, 12), np.zeros(12), np.zeros(12)], 1)
     cloud = PointCloud(pose.to_scan(canonical))
     working = np.arange(0, 12, 2)

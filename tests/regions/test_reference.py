@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 from builders.small_model import COUNT, build, build_doubtful, chair
 from nrdf.errors import RegionError
 from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf.regions.model import Model
@@ -262,7 +263,7 @@ def test_what_has_no_counterpart_on_the_reference_belongs_to_no_region(taught, r
 
 def test_a_pose_takes_the_place_of_orientation_and_box(taught, reference):
     cloud, masks = reference
-    turn = upright(up_axis("z")) @ about_up(2.0)
+    turn = upright(up_axis("z")) @ rotation_about_up(2.0)
     pose = Similarity(turn, np.array([5.0, -7.0, 9.0]), 30.0)
     own = taught.reference.pose
     scan = PointCloud(pose.to_scan(own.to_canonical(cloud.points)), cloud.normals @ turn.T)

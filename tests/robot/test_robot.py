@@ -16,7 +16,8 @@ if find_spec("mujoco") is None:
 
 from builders.plate_job import write_job_on
 from nrdf.errors import ProcessError, RobotError
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.robot.model.arm import BUNDLED, load_arm
 from nrdf.robot.model.cell import Cell, Placement, upright_rotation
 from nrdf.robot.model.signed_distance import _without_specks, distance_field_from_points
@@ -255,7 +256,7 @@ def turned_job(plate_job, folder, pose):
 def test_a_job_stands_upright_in_the_cell_as_its_pose_says(plate_job, tmp_path, up):
     from nrdf.robot.simulation.job import read_simulation_job
 
-    rotation = upright(up_axis(up)) @ about_up(0.4)
+    rotation = upright(up_axis(up)) @ rotation_about_up(0.4)
     pose = Similarity(rotation, np.array([2.0, -1.0, 5.0]), 1.0)
     work = read_simulation_job(turned_job(plate_job, tmp_path, pose))
     assert work.origin == "the object stands as the job's pose says" and not work.assumed

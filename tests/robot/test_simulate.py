@@ -10,7 +10,8 @@ import trimesh
 
 from nrdf import cli
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import read_cloud
 from nrdf.io.ply import read_header, read_scalars
 from nrdf.scans.simulate import ScanSettings, simulate_scan
@@ -18,7 +19,7 @@ from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import tessellate
 
 BALL = trimesh.creation.icosphere(4, 0.5)
-POSE = Similarity(upright(up_axis("z")) @ about_up(0.7), np.array([5.0, -3.0, 1.0]), 100.0)
+POSE = Similarity(upright(up_axis("z")) @ rotation_about_up(0.7), np.array([5.0, -3.0, 1.0]), 100.0)
 SMALL = ScanSettings(pixels=60)
 
 
@@ -162,7 +163,7 @@ def test_upright_and_axes():
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(rotation) == pytest.approx(1)
     np.testing.assert_allclose(upright(up_axis("y")), np.eye(3))
-    np.testing.assert_allclose(about_up(np.pi / 2) @ [0, 0, 1], [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(rotation_about_up(np.pi / 2) @ [0, 0, 1], [1, 0, 0], atol=1e-12)
     for wrong in ("w", "0 0 0", "1 2", "+z"):
         with pytest.raises(CloudError, match="no direction; give one of x, y"):
             up_axis(wrong)

@@ -11,7 +11,8 @@ import pytest
 import nrdf
 from builders.scenes import UP, pose, scan_of, triangles, yaw_error
 from nrdf.errors import CloudError, ModelError
-from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.geometry.units import find_unit
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.model import Model
@@ -99,7 +100,7 @@ def test_without_sensors_a_sheet_stands_for_both_of_its_sides():
 
 
 def test_up_is_searched_where_it_is_not_known():
-    turned = Similarity(upright(up_axis("-y")) @ about_up(1.0), np.zeros(3), 5.0)
+    turned = Similarity(upright(up_axis("-y")) @ rotation_about_up(1.0), np.zeros(3), 5.0)
     points = turned.to_scan(full("chair", CHAIR).points)
     found = clean_and_align(scorer("chair"), PointCloud(points))
     np.testing.assert_allclose(found.alignment.best.up, up_axis("-y"))
@@ -195,11 +196,11 @@ def test_a_category_without_a_family_needs_an_example():
 @pytest.mark.parametrize("start", [-9.0, 0.0, 9.0])
 def test_the_mirror_plane_is_found_from_near_it(start):
     surface = full("chair", CHAIR)
-    turn, away = about_up(0.4), np.array([0.2, 0.0, -0.3])
+    turn, away = rotation_about_up(0.4), np.array([0.2, 0.0, -0.3])
     plane = mirror_plane(
         surface.points @ turn.T + away,
         surface.normals @ turn.T,
-        about_up(0.4 + np.radians(start))[:, 2],
+        rotation_about_up(0.4 + np.radians(start))[:, 2],
     )
     assert np.degrees(np.arccos(plane.normal @ turn[:, 2])) < 0.5
     assert plane.offset == pytest.approx(away @ turn[:, 2], abs=0.005)
@@ -208,5 +209,5 @@ def test_the_mirror_plane_is_found_from_near_it(start):
 
 def test_across_no_mirror_plane_little_agrees():
     surface = full("car", CHAIR)
-    plane = mirror_plane(surface.points, surface.normals, about_up(np.radians(45))[:, 2])
+    plane = mirror_plane(surface.points, surface.normals, rotation_about_up(np.radians(45))[:, 2])
     assert plane.agreement < 0.4

@@ -27,7 +27,8 @@ from nrdf.field.kind_network import (
     up_of,
 )
 from nrdf.field.zoo import add_to_zoo, list_models
-from nrdf.geometry.similarity import about_up, up_axis, upright
+from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.similarity import up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.aligned_scan import align
 from nrdf.scans.kind_check import FITS, LEAST, check_by_network
@@ -125,7 +126,7 @@ def test_a_turned_or_mirrored_cloud_is_told_alike(side):
     told = network.probabilities(points)
     assert told.sum() == pytest.approx(1, abs=1e-5)
     mirror = np.diag([1.0, 1.0, side])
-    moved = about_up(np.pi / 2) @ mirror
+    moved = rotation_about_up(np.pi / 2) @ mirror
     again = network.probabilities(7 * points @ moved.T + 3)
     for answer, rotation in enumerate(ORIENTATIONS):
         there = orientation_of(moved @ rotation @ mirror)
@@ -141,7 +142,7 @@ def test_few_points_are_enough():
 
 
 def test_it_says_what_it_sees_and_what_to_do():
-    quarter = orientation_of(about_up(np.pi / 2))
+    quarter = orientation_of(rotation_about_up(np.pi / 2))
     assert "it looks like one facing -Z; give --up y to have it aligned" in said(quarter)
     over = orientation_of(np.diag([1.0, -1.0, -1.0]))
     assert "upside down; give --up -y to have it aligned" in said(over)
@@ -257,7 +258,7 @@ def test_what_ships_tells_members_from_turned_ones_and_from_others(category, cap
 
 def test_an_aligned_scan_is_checked_in_its_pose():
     model = nrdf.load_model("chair")
-    turn = upright(up_axis("z")) @ about_up(1.0)
+    turn = upright(up_axis("z")) @ rotation_about_up(1.0)
     found = align(model, PointCloud(member("chair") @ turn.T), up="z")
     assert found.kind.fits and found.kind.probability > LEAST
     car = align(model, PointCloud(member("car") @ turn.T), up="z")

@@ -15,7 +15,7 @@ from nrdf.field import yaw_network as yaws
 from nrdf.field.weights import load_tensors
 from nrdf.field.yaw_network import YawNetwork, load_yaw_network, log_probability_at, turn
 from nrdf.field.zoo import add_to_zoo, list_models
-from nrdf.geometry.similarity import LEFT_FOR_RIGHT, about_up
+from nrdf.geometry.canonical import MIRROR, rotation_about_up
 from nrdf.io.locks import write_lock
 from nrdf.shapes.dataset import IndexRow, write_index, write_shape
 from nrdf.training.camera_views import CAMERAS, load_views, split
@@ -60,10 +60,10 @@ def test_a_turned_cloud_has_turned_yaws_and_a_mirrored_one_mirrored_ones():
     asked = network()
     told = asked.log_probability(points, normals)
     assert np.exp(told).sum() == pytest.approx(1, abs=1e-5)
-    turned = about_up(np.radians(60))
+    turned = rotation_about_up(np.radians(60))
     again = asked.log_probability(7 * points @ turned.T + 3, normals @ turned.T)
     np.testing.assert_allclose(again, np.roll(told, 6), atol=1e-4)
-    mirrored = asked.log_probability(points * LEFT_FOR_RIGHT, normals * LEFT_FOR_RIGHT)
+    mirrored = asked.log_probability(points * MIRROR, normals * MIRROR)
     np.testing.assert_allclose(mirrored, np.roll(told[::-1], 1), atol=1e-4)
 
 
@@ -80,7 +80,7 @@ def test_between_its_bins_a_distribution_is_interpolated():
 
 
 def test_turning_is_about_up_as_elsewhere():
-    np.testing.assert_allclose(turn(torch.tensor(0.7)), about_up(0.7), atol=1e-6)
+    np.testing.assert_allclose(turn(torch.tensor(0.7)), rotation_about_up(0.7), atol=1e-6)
 
 
 def test_drawn_clouds_are_what_cameras_see_turned_by_their_yaw(folder):
@@ -144,7 +144,9 @@ def test_what_was_trained_says_what_it_is_and_tells_yaw(trained):
     assert metadata["scores"]["wrong-yaws"] < 0.5, "chance is 0.83"
     assert trained.stat().st_size < 500_000
     points, normals = cloud()
-    told = found.log_probability(points @ about_up(2.0).T, normals @ about_up(2.0).T)
+    told = found.log_probability(
+        points @ rotation_about_up(2.0).T, normals @ rotation_about_up(2.0).T
+    )
     off = told.argmax() * 2 * np.pi / 36 - 2.0
     assert np.cos(off) > 0.9
 

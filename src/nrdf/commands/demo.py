@@ -161,15 +161,16 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     import numpy as np
 
     from nrdf.bundled import REAL, bundled_mesh
+    from nrdf.geometry.canonical import rotation_about_up
     from nrdf.geometry.mesh import Mesh
-    from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+    from nrdf.geometry.similarity import Similarity, up_axis, upright
     from nrdf.io.cloud import write_cloud
     from nrdf.scans.aligned_scan import clean_and_align
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf.scans.simulate import ScanSettings, simulate_scan
 
     mesh = bundled_mesh()
-    turn = upright(up_axis("z")) @ about_up(SCAN_YAW)
+    turn = upright(up_axis("z")) @ rotation_about_up(SCAN_YAW)
     pose = Similarity(turn, np.array(SCAN_PLACE_M), 1.0)
     settings = ScanSettings(views=8, pixels=SCAN_PIXELS, noise=SCAN_NOISE_M, floor=True)
     rng = np.random.default_rng(0)

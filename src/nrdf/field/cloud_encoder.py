@@ -13,10 +13,10 @@ import torch
 from nrdf.field.base import Field
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.field.kind_network import KindNetwork, find_kind_network
-from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.canonical import MIRROR, canonical_transform
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
-from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import check_cloud
 from nrdf.io.inputs import as_cloud
 
@@ -91,8 +91,8 @@ class CloudEncoder:
         start = time.perf_counter()
         seen, lines = points, normals
         if mirrored:
-            seen = np.concatenate([points, points * LEFT_FOR_RIGHT])
-            lines = np.concatenate([normals, normals * LEFT_FOR_RIGHT])
+            seen = np.concatenate([points, points * MIRROR])
+            lines = np.concatenate([normals, normals * MIRROR])
         chosen = encoder_subset(seen, self.field.config.encoder_points)
         with torch.inference_mode():
             z = self.field.embed(self.tensor(seen[chosen])[None], self.tensor(lines[chosen])[None])

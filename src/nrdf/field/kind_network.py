@@ -19,7 +19,8 @@ from nrdf.errors import ModelError
 from nrdf.field.base import FieldConfig
 from nrdf.field.weights import load_tensors
 from nrdf.field.zoo import KIND, ZOO, find_weights, list_models
-from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, about_up, up_axis, upright
+from nrdf.geometry.canonical import MIRROR, rotation_about_up
+from nrdf.geometry.similarity import AXES, up_axis, upright
 
 KIND_ZOO = ZOO / KIND
 """Folder of the networks that ship, with an index of its own; a network's name is its category."""
@@ -27,7 +28,7 @@ UPS = np.array([up_axis(name) for name in AXES])
 """(6, 3) directions that an object's up may have."""
 ORIENTATIONS = np.round(
     [
-        upright(up) @ about_up(np.pi / 2 * turn)
+        upright(up) @ rotation_about_up(np.pi / 2 * turn)
         for up in UPS[[1, 0, 2, 3, 4, 5]]
         for turn in range(4)
     ]
@@ -112,16 +113,16 @@ def up_of(answer: int) -> np.ndarray | None:
 def _answers(shown: np.ndarray) -> np.ndarray:
     """Which answer about a cloud that was moved by `shown` (3, 3), a turn, perhaps mirrored, is
     each of the answers about the cloud itself: (ANSWERS,)."""
-    mirror = np.diag(LEFT_FOR_RIGHT) if np.linalg.det(shown) < 0 else np.eye(3)
+    mirror = np.diag(MIRROR) if np.linalg.det(shown) < 0 else np.eye(3)
     turned = [orientation_of(shown @ rotation @ mirror) for rotation in ORIENTATIONS]
     ups = [ASKEW + int((UPS @ (shown @ up)).argmax()) for up in UPS]
     return np.array([*turned, *ups, TILTED, OTHER])
 
 
 _SHOWN = [
-    about_up(np.pi / 2 * turn) @ side
+    rotation_about_up(np.pi / 2 * turn) @ side
     for turn in range(4)
-    for side in (np.eye(3), np.diag(LEFT_FOR_RIGHT))
+    for side in (np.eye(3), np.diag(MIRROR))
 ]
 _ANSWERED = [_answers(shown) for shown in _SHOWN]
 

@@ -10,6 +10,9 @@ import numpy as np
 
 from nrdf.errors import CloudError
 
+MIRROR = np.array([1.0, 1.0, -1.0])
+"""Canonical coordinates times this are those of the mirror image, left for right."""
+
 
 def bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner, each (3,), of `points` (n, 3), in their unit."""
@@ -32,3 +35,11 @@ def canonical_transform(points: np.ndarray) -> tuple[np.ndarray, float]:
             "needed: all points coincide, or their coordinates are not finite"
         )
     return (lowest + highest) / 2.0, scale
+
+
+def rotation_about_up(yaw: float | np.ndarray) -> np.ndarray:
+    """Rotation (…, 3, 3) by `yaw` (rad) about canonical +Y, right-handed: from +Z towards +X."""
+    yaw = np.asarray(yaw, np.float64)
+    c, s, zero, one = np.cos(yaw), np.sin(yaw), np.zeros_like(yaw), np.ones_like(yaw)
+    rows = [[c, zero, s], [zero, one, zero], [-s, zero, c]]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

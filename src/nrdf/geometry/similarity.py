@@ -8,8 +8,6 @@ import numpy as np
 
 from nrdf.errors import CloudError
 
-LEFT_FOR_RIGHT = np.array([1.0, 1.0, -1.0])
-"""Canonical coordinates times this are those of the mirror image."""
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 
 
@@ -47,14 +45,6 @@ class Similarity:
             other.to_scan(self.translation[None])[0],
             self.scale * other.scale,
         )
-
-
-def about_up(yaw: float | np.ndarray) -> np.ndarray:
-    """Rotation (…, 3, 3) by `yaw` (rad) about canonical +Y, right-handed: from +Z towards +X."""
-    yaw = np.asarray(yaw, np.float64)
-    c, s, zero, one = np.cos(yaw), np.sin(yaw), np.zeros_like(yaw), np.ones_like(yaw)
-    rows = [[c, zero, s], [zero, one, zero], [-s, zero, c]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def upright(up: np.ndarray) -> np.ndarray:

@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.geometry.canonical import MIRROR
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import downsample
-from nrdf.geometry.similarity import LEFT_FOR_RIGHT, Similarity
+from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.mapping import MappedPoints
 from nrdf.regions.reference import EncodedReference
@@ -99,15 +100,13 @@ class Correspondence:
         encoded, reference = self.reference.encoded, self.reference.encoded.reference
         one = encoded.map_surface_points(points, normals, self.target)
         other = self.reference.mirrored.map_surface_points(
-            LEFT_FOR_RIGHT * reference.canonical(points),
-            LEFT_FOR_RIGHT * reference.canonical_normals(normals),
+            MIRROR * reference.canonical(points),
+            MIRROR * reference.canonical_normals(normals),
             self._mirrored,
         )
         return one._replace(
-            points=0.5 * (one.points + LEFT_FOR_RIGHT * other.points),
-            normals=unit_vectors(
-                unit_vectors(one.normals) + LEFT_FOR_RIGHT * unit_vectors(other.normals)
-            ),
+            points=0.5 * (one.points + MIRROR * other.points),
+            normals=unit_vectors(unit_vectors(one.normals) + MIRROR * unit_vectors(other.normals)),
             existence=0.5 * (one.existence + other.existence),
             error=0.5 * (one.error + other.error),
         )
@@ -200,7 +199,7 @@ def surface_of(encoded: EncodedCloud) -> Surface:
 
 def _mirrored(model: CloudEncoder, encoded: EncodedCloud) -> EncodedCloud:
     """The mirror image of an encoded cloud, left for right, in the canonical frame."""
-    image = PointCloud(LEFT_FOR_RIGHT * encoded.points, LEFT_FOR_RIGHT * encoded.normals)
+    image = PointCloud(MIRROR * encoded.points, MIRROR * encoded.normals)
     return model.encode(image, Similarity(np.eye(3), np.zeros(3), 1.0))
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.field.yaw_network import log_probability_at
-from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.canonical import MIRROR, canonical_transform, rotation_about_up
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
-from nrdf.geometry.similarity import AXES, LEFT_FOR_RIGHT, Similarity, about_up, up_axis, upright
+from nrdf.geometry.similarity import AXES, Similarity, up_axis, upright
 from nrdf.io.cloud import PointCloud, check_cloud
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
 from nrdf.scans.pose_scorer import PoseScorer, sparse_subset
@@ -104,7 +104,7 @@ class _Hypothesis:
 
     @property
     def rotation(self) -> np.ndarray:
-        return upright(self.up) @ about_up(self.yaw)
+        return upright(self.up) @ rotation_about_up(self.yaw)
 
     def frame(self, points: np.ndarray) -> Similarity:
         """Canonical to working by the bounding box of the points (n, 3), even about the plane."""
@@ -219,7 +219,9 @@ def _against(facing: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesi
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:
     """Hypotheses near one: both ways along the mirror plane, or a few yaws where there is none."""
     turn = upright(found.up)
-    plane = mirror_plane(working.points @ turn, working.normals @ turn, about_up(found.yaw)[:, 2])
+    plane = mirror_plane(
+        working.points @ turn, working.normals @ turn, rotation_about_up(found.yaw)[:, 2]
+    )
     if plane.agreement < _SYMMETRIC:
         return [_Hypothesis(found.up, found.yaw + nudge) for nudge in _NUDGES]
     yaw = float(np.arctan2(plane.normal[0], plane.normal[2]))
@@ -234,8 +236,8 @@ def _completed(
     points, normals, half = points.copy(), normals.copy(), points.shape[1] // 2
     for index, found in enumerate(hypotheses):
         if found.plane is not None:
-            points[index, 1::2] = points[index, ::2][:half] * LEFT_FOR_RIGHT
-            normals[index, 1::2] = normals[index, ::2][:half] * LEFT_FOR_RIGHT
+            points[index, 1::2] = points[index, ::2][:half] * MIRROR
+            normals[index, 1::2] = normals[index, ::2][:half] * MIRROR
     return points, normals
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from nrdf.errors import DataError, OutputError
 from nrdf.io.atomic import write_atomically
+from nrdf.shapes.occupancy import pack_occupancies, unpack_occupancies
 
 INDEX = "index.csv"
 SPLITS = ("train", "val", "test")
@@ -72,7 +73,7 @@ def write_shape(path: str | Path, shape: Shape, stamp: str = "") -> None:
         "pointcloud/points": np.asarray(shape.surface_points, np.float32),
         "pointcloud/normals": np.asarray(shape.surface_normals, np.float32),
         "points/points": np.asarray(shape.query_points),
-        "points/occupancies": np.packbits(np.asarray(shape.query_occupancies, bool)),
+        "points/occupancies": pack_occupancies(shape.query_occupancies),
         "loc": np.asarray(shape.loc, np.float64),
         "scale": np.asarray(shape.scale, np.float64),
         "category": np.asarray(shape.category),
@@ -105,7 +106,9 @@ def read_shape(path: str | Path) -> Shape:
     arrays = _load(path)
     needed = ("pointcloud/points", "pointcloud/normals", "points/points", "points/occupancies")
     _require(path, arrays, needed)
-    occupancies = _unpack(path, arrays["points/occupancies"], len(arrays["points/points"]))
+    occupancies = unpack_occupancies(
+        path, arrays["points/occupancies"], len(arrays["points/points"])
+    )
     _check(str(path), arrays, len(occupancies))
     groups = sorted({key.split("/")[1] for key in arrays if key.startswith("correspondence/")})
     for group in groups:
@@ -157,7 +160,7 @@ def _read_folder(path: Path) -> Shape:
     query_file = next((path / name for name in names if (path / name).is_file()), path / names[0])
     queries = _load(query_file)
     _require(query_file, queries, ("points", "occupancies"))
-    occupancies = _unpack(query_file, queries["occupancies"], len(queries["points"]))
+    occupancies = unpack_occupancies(query_file, queries["occupancies"], len(queries["points"]))
     loc = np.asarray(cloud.get("loc", np.zeros(3)), np.float64)
     scale = float(cloud.get("scale", 1.0))
     shape = Shape(
@@ -192,17 +195,6 @@ def _require(path: Path, arrays: dict[str, np.ndarray], keys: list[str] | tuple[
         raise DataError(
             f"{path}: no array {', '.join(missing)}; it has: {', '.join(arrays) or '(none)'}"
         )
-
-
-def _unpack(path: Path, occupancies: np.ndarray, count: int) -> np.ndarray:
-    """(count,) bool from packed bits, or from one value a query as older files have."""
-    if occupancies.ndim == 1 and len(occupancies) == count and occupancies.dtype.kind in "bf":
-        return occupancies > 0.5
-    if occupancies.dtype == np.uint8 and occupancies.shape == ((count + 7) // 8,):
-        return np.unpackbits(occupancies, count=count).astype(bool)
-    raise DataError(
-        f"{path}: {occupancies.shape} occupancies of {occupancies.dtype} do not fit {count} queries"
-    )
 
 
 def _check(path: str, arrays: dict[str, np.ndarray], queries: int) -> None:

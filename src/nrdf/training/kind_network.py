@@ -28,9 +28,9 @@ from nrdf.field.kind_network import (
     KindConfig,
     KindNetwork,
 )
-from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.canonical import canonical_transform, rotation_about_up
 from nrdf.geometry.mesh import outer_skin
-from nrdf.geometry.similarity import about_up, upright
+from nrdf.geometry.similarity import upright
 from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.shapes.boxes import Boxes
 from nrdf.shapes.dataset import INDEX
@@ -183,7 +183,9 @@ def draw(
 
 def _turned(what: str, rng: np.random.Generator) -> tuple[np.ndarray, int]:
     """A rotation (3, 3), and the answer that is right about an object so turned."""
-    loose = about_up(rng.uniform(-_LOOSE_YAW, _LOOSE_YAW)) @ _tilt(rng.uniform(0, _LOOSE_TILT), rng)
+    loose = rotation_about_up(rng.uniform(-_LOOSE_YAW, _LOOSE_YAW)) @ _tilt(
+        rng.uniform(0, _LOOSE_TILT), rng
+    )
     if what == "forward":
         return loose, 0
     if what == "turned":
@@ -192,7 +194,7 @@ def _turned(what: str, rng: np.random.Generator) -> tuple[np.ndarray, int]:
     yaw = np.pi / 2 * rng.integers(4) + rng.uniform(*_ODD)
     if what == "askew":
         up = int(rng.integers(len(UPS)))
-        return upright(UPS[up]) @ about_up(yaw) @ _tilt(
+        return upright(UPS[up]) @ rotation_about_up(yaw) @ _tilt(
             rng.uniform(0, _LOOSE_TILT), rng
         ), ASKEW + up
     if what == "tilted":
@@ -200,12 +202,12 @@ def _turned(what: str, rng: np.random.Generator) -> tuple[np.ndarray, int]:
         return ORIENTATIONS[rng.integers(len(ORIENTATIONS))] @ tilt @ loose, TILTED
     # Others mostly stand upright, with any heading.
     up = UPS[1] if rng.random() < 0.6 else UPS[rng.integers(len(UPS))]
-    return upright(up) @ about_up(rng.uniform(0, 2 * np.pi)) @ loose, OTHER
+    return upright(up) @ rotation_about_up(rng.uniform(0, 2 * np.pi)) @ loose, OTHER
 
 
 def _tilt(angle: float, rng: np.random.Generator) -> np.ndarray:
     """A rotation (3, 3) by an angle (rad) about a random level axis."""
-    heading = about_up(rng.uniform(0, 2 * np.pi))
+    heading = rotation_about_up(rng.uniform(0, 2 * np.pi))
     up = np.array([np.sin(angle), np.cos(angle), 0.0])
     return heading @ upright(up) @ heading.T
 
@@ -234,7 +236,7 @@ def _heaps(count: int, rng: np.random.Generator) -> Views:
         size = np.exp(rng.uniform(-3.5, 0, (boxes, 3)))
         level = rng.random(boxes) < 0.7
         turns = [
-            about_up(rng.choice([0.0, rng.uniform(0, np.pi)]))
+            rotation_about_up(rng.choice([0.0, rng.uniform(0, np.pi)]))
             if flat
             else np.linalg.qr(rng.normal(size=(3, 3)))[0]
             for flat in level

@@ -61,7 +61,8 @@ def scan(
     import numpy as np
 
     from nrdf.errors import DataError
-    from nrdf.geometry.similarity import Similarity, about_up, up_axis, upright
+    from nrdf.geometry.canonical import rotation_about_up
+    from nrdf.geometry.similarity import Similarity, up_axis, upright
     from nrdf.io.atomic import write_json
     from nrdf.io.cloud import write_cloud
     from nrdf.io.formats.mesh_file import load_mesh
@@ -75,7 +76,7 @@ def scan(
     with output_files(out, beside, [mesh]) as folder:
         rng = np.random.default_rng(seed)
         turn = rng.uniform(0, 2 * np.pi) if yaw is None else np.radians(yaw)
-        pose = Similarity(upright(up_axis(up)) @ about_up(turn), np.array(offset), scale)
+        pose = Similarity(upright(up_axis(up)) @ rotation_about_up(turn), np.array(offset), scale)
         settings = ScanSettings(
             views=views,
             noise=noise,

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.similarity import LEFT_FOR_RIGHT
+from nrdf.geometry.canonical import MIRROR
 from nrdf.surface.surface import Surface
 
 _NORMAL_WEIGHT = 6.0
@@ -70,7 +70,7 @@ class Canvas:
         here = (surface.points - middle) / surface.spacing
         turned = _NORMAL_WEIGHT * surface.normals
         tree = cKDTree(np.hstack([here, turned]))
-        there = np.hstack([here * LEFT_FOR_RIGHT, turned * LEFT_FOR_RIGHT])
+        there = np.hstack([here * MIRROR, turned * MIRROR])
         away, which = tree.query(there, distance_upper_bound=_MIRRORED)
         found = np.isfinite(away)
         return found & np.append(mask, False)[which]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.frames import quaternions_wxyz
-from nrdf.geometry.similarity import about_up
 from nrdf.studio.model.playback import EVERY_PATH, FLOOR, Playback
 from nrdf.studio.scene.scene_view import ObjectView
 
@@ -78,7 +78,7 @@ class ArmView:
         playback = self.playback
         angle = float(playback.turntable_rad[index])
         # The turntable's axis goes through the cell's origin.
-        turn = about_up(angle)
+        turn = rotation_about_up(angle)
         self.object_view.place(self._origin + turn @ self._object, turn @ self._upright)
         for body, frame in self._bodies.items():
             frame.position = tuple(playback.positions[index, body] * self._factor)

@@ -1,0 +1,61 @@
+"""Fewer points, evenly spread, and directions evenly spread."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from builders.oriented_clouds import sphere
+from nrdf.geometry.sampling import downsample, fibonacci_directions
+
+
+def test_directions_are_unit_and_even():
+    directions = fibonacci_directions(60)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
+    assert np.linalg.norm(directions.mean(axis=0)) < 0.01
+    cosine = directions @ directions.T - 2 * np.eye(60)
+    assert np.degrees(np.arccos(cosine.max(axis=1))).min() > 20
+
+
+@pytest.mark.parametrize(
+    "count", [pytest.param(5, id="few"), pytest.param(1000, id="some"), 19_999, 20_000, 30_000]
+)
+def test_thinning_keeps_as_many_points_as_asked(count):
+    points, _ = sphere(np.random.default_rng(0), 20_000)
+    index = downsample(points, count, np.random.default_rng(1))
+    assert len(index) == min(count, 20_000) == len(set(index))
+    assert (np.diff(index) > 0).all()
+
+
+def test_thinning_evens_out_the_density():
+    rng = np.random.default_rng(0)
+    points, _ = sphere(rng, 60_000)
+    dense_above = points[(points[:, 1] > 0) | (rng.random(60_000) < 0.03)]
+    above = dense_above[downsample(dense_above, 400, rng), 1] > 0
+    assert (dense_above[:, 1] > 0).mean() > 0.95
+    assert 0.4 < above.mean() < 0.65
+
+
+def test_thinning_copes_with_coincident_points():
+    points = np.repeat(np.eye(3), 50, axis=0)
+    assert len(downsample(points, 10, np.random.default_rng(0))) == 10
+    assert len(downsample(np.zeros((100, 3)), 10, np.random.default_rng(0))) == 10
+
+
+def test_thinning_ten_million_points_is_quick():
+    points = np.random.default_rng(0).random((10_000_000, 3), dtype=np.float32)
+    points[:, 1] = 0.0
+    start = time.process_time()
+    index = downsample(points, 8192, np.random.default_rng(1))
+    assert time.process_time() - start < 8.0  # 2 s on an idle core
+    for corner in (points[index] < 0.25, points[index] > 0.75):
+        assert corner[:, [0, 2]].all(axis=1).mean() == pytest.approx(1 / 16, rel=0.2)
+
+
+def test_thinning_takes_points_that_fill_a_volume():
+    points = np.random.default_rng(0).random((300_000, 3))
+    index = downsample(points, 1000, np.random.default_rng(1))
+    assert len(index) == 1000
+    assert (points[index] < 0.5).all(axis=1).mean() == pytest.approx(1 / 8, abs=0.04)

@@ -1,0 +1,35 @@
+"""Which points are seen, and from which side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from builders.oriented_clouds import box, sphere
+from nrdf.geometry.visibility import seen_from_both_sides, visibility
+
+
+def test_visibility_tells_the_outer_side_and_finds_buried_points():
+    rng = np.random.default_rng(0)
+    outer, outer_normals = sphere(rng, 6000)
+    inner, inner_normals = sphere(rng, 1000, radius=0.3)
+    points = np.concatenate([outer, inner])
+    given_normals = np.concatenate([outer_normals, inner_normals])
+    given_normals[:6000:3] *= -1
+    vote, front, back = visibility(points, given_normals)
+    outward = (given_normals * points).sum(axis=1) > 0
+    assert ((vote > 0) == outward)[:6000].all()
+    seen, unseen = np.where(outward, front, back), np.where(outward, back, front)
+    assert (seen[:6000] >= 10).mean() > 0.999
+    assert unseen[:6000].mean() < 1.0
+    assert (np.maximum(front, back)[6000:] < 3).mean() > 0.95
+
+
+def test_both_sides_are_seen_of_an_open_surface_only():
+    rng = np.random.default_rng(0)
+    points, normals = box(rng, 6000, (1.0, 0.05, 0.8))
+    assert not seen_from_both_sides(points, normals).any()
+    bowl, lines = sphere(rng, 6000)
+    dish = bowl[:, 1] < -0.3
+    assert seen_from_both_sides(bowl[dish], lines[dish]).mean() > 0.8
+    flask = bowl[:, 1] < 0.4  # a small hole changes nothing
+    assert not seen_from_both_sides(bowl[flask], lines[flask]).any()
