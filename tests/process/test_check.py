@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from builders.taught_box import SAND, bound_knowledge, cloud
+from nrdf.errors import ProcessError
 from nrdf.io.cloud import PointCloud
-from nrdf.process.check import check_knowledge
+from nrdf.process import check
+from nrdf.process.check import check_category, check_knowledge
 
 
 def checked(reference=None, name="top", **changes):
@@ -44,7 +46,7 @@ def test_what_cannot_be_done_is_said_by_field_and_value(change, message):
         ({"force_n": None}, "sand without force_n: the robot holds a position"),
     ],
 )
-def test_what_can_be_done_but_is_doubtful_is_said(change, message):
+def test_what_can_be_done_but_should_be_looked_at_has_a_warning(change, message):
     given = {key: value for key, value in {**SAND, **change}.items() if value is not None}
     (row,) = check_knowledge(bound_knowledge({"top": [given]}))
     assert any(message in line for line in row.warnings) and row.fault == ""
@@ -80,3 +82,10 @@ def test_spirals_and_contours_leave_no_gaps_in_corners(trajectory):
     stepover = row.process.distance_between_lines_m
     assert row.metrics.coverage > 0.95
     assert row.metrics.line_spacing_worst_m < 1.15 * stepover
+
+
+def test_a_category_of_ones_own_is_right_where_a_model_is_given(untrained, monkeypatch):
+    monkeypatch.setattr(check, "known_categories", lambda: ["car"])
+    check_category("chair", untrained)
+    with pytest.raises(ProcessError, match="known: car"):
+        check_category("chair")

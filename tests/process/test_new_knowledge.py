@@ -6,9 +6,8 @@ import pytest
 from builders.taught_box import cloud, faces
 from nrdf.errors import ProcessError, RegionError
 from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.process import check
 from nrdf.process.bound_knowledge import checksum, read_bound_knowledge
-from nrdf.process.check import check_category, check_knowledge
+from nrdf.process.check import check_knowledge
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
 from nrdf.process.new_knowledge import KINDS, PLACEHOLDER, new_knowledge
 
@@ -103,10 +102,3 @@ def test_a_category_that_no_model_is_for_is_offered_the_nearest(files, untrained
     assert not new_knowledge(reference, "table", files).allow_unusual  # a family, to train with
     with pytest.raises(ProcessError, match=r"category is 'chiar', but the model .* is for chair"):
         new_knowledge(reference, "chiar", files, model=str(untrained), allow_unusual=True)
-
-
-def test_a_category_of_ones_own_is_right_where_a_model_is_given(files, untrained, monkeypatch):
-    monkeypatch.setattr(check, "known_categories", lambda: ["car"])
-    check_category("chair", untrained)
-    with pytest.raises(ProcessError, match="known: car"):
-        check_category("chair")

@@ -18,7 +18,7 @@ from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import write_knowledge
-from nrdf.process.path_warnings import measure_warnings
+from nrdf.process.path_warnings import path_warnings
 from nrdf.process.transfer import ProcessTransfer, working
 from nrdf.process.warp import warp_segments
 
@@ -192,7 +192,7 @@ def test_paths_are_judged_by_the_mesh_that_was_given(model):
     assert step.metrics.surface_distance_99_m < 1e-3
     assert step.metrics.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
     assert step.metrics.true_distance_worst_m >= step.metrics.true_distance_95_m
-    (warning,) = (w for w in measure_warnings(step.process, step.metrics) if "as given" in w)
+    (warning,) = (w for w in path_warnings(step.process, step.metrics) if "as given" in w)
     assert re.match(r"1 % of the way on the surface is more than \d", warning)
 
 

@@ -1,4 +1,4 @@
-"""A transfer's folder: what is in it can be read again, and its page needs nothing else."""
+"""A job's folder: what is in it can be read again, and its HTML report needs nothing else."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import pytest
 
 import nrdf
 from builders.taught_box import SAND, bound_knowledge, cloud, made_up
+from nrdf.errors import OutputError
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import read_cloud
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.check import check_knowledge
 from nrdf.process.limits import Limits
 from nrdf.process.transfer import ProcessTransfer
-from nrdf.reports.job_folder import job_of, panel_of, write_job_files
+from nrdf.reports.job_folder import job_of, panel_of, write_job, write_job_files
 from nrdf.toolpath.file import read_toolpaths
 
 PAINT = {
@@ -107,13 +108,23 @@ def test_the_targets_knowledge_is_as_good_as_the_taught_one(folder, transferred)
         assert row.metrics.coverage == pytest.approx(step.metrics.coverage, abs=0.03)
 
 
+def test_a_job_is_written_whole_and_replaced_only_if_asked(tmp_path):
+    place = tmp_path / "job"
+    write_job(place, made_up(missing="found nowhere"), "chair 7")
+    assert json.loads((place / "report.json").read_text())["title"] == "chair 7"
+    with pytest.raises(OutputError, match="not empty"):
+        write_job(place, made_up(missing="found nowhere"))
+    write_job(place, made_up(missing="found nowhere"), "chair 8", overwrite=True)
+    assert json.loads((place / "report.json").read_text())["title"] == "chair 8"
+
+
 def test_the_target_is_in_metres(folder):
     target = read_cloud(folder / "target.ply")
     assert target.unit == "m"
     np.testing.assert_allclose(target.points, cloud(seed=1).points, atol=1e-6)
 
 
-def test_the_page_needs_no_network_and_escapes_what_it_shows(folder):
+def test_the_html_report_needs_no_network_and_escapes_what_it_shows(folder):
     page = (folder / "report.html").read_text()
     assert not re.search(r"(src|href)=\"(?!data:image/png;base64,)", page)
     assert "<script" not in page and "@import" not in page and "url(" not in page

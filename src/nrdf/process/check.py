@@ -16,7 +16,7 @@ from nrdf.geometry.units import in_words
 from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
-from nrdf.process.path_warnings import measure_warnings
+from nrdf.process.path_warnings import path_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
@@ -101,7 +101,7 @@ def check_process(
         metrics = measure_path(surface, region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))
-    warnings += measure_warnings(process, metrics)
+    warnings += path_warnings(process, metrics)
     return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments))
 
 

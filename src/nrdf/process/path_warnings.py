@@ -16,7 +16,7 @@ _FARTHEST_M = 0.001
 _STEEPEST_RAD = np.radians(5.0)
 
 
-def measure_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
+def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     """What a person should look at before a path is driven."""
     lines = []
     if metrics.left_out[NO_CLEARANCE] > 0.0:

@@ -32,9 +32,9 @@ def write_transfer_html(
 ) -> None:
     """Write the HTML report of a transfer.
 
-    report: as `transfer_report.report_of` makes it. picture: file of the whole target's picture.
-    details: by region, a close picture (h, w, 3) with values in [0, 1]. Raises OutputError if the
-    file cannot be written.
+    report: from `transfer_report`, with title and seconds. picture: file of the whole target's
+    picture. details: by region, a close picture (h, w, 3) with values in [0, 1]. Raises OutputError
+    if the file cannot be written.
     """
     colours = {
         name: "#" + "".join(f"{round(255 * c):02x}" for c in colour)

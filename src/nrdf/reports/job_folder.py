@@ -23,7 +23,7 @@ from nrdf.process.taught_paths import contact_points
 from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
 from nrdf.reports.html import write_transfer_html
-from nrdf.reports.transfer_report import report_of
+from nrdf.reports.transfer_report import transfer_report
 from nrdf.toolpath.file import write_toolpaths
 from nrdf.toolpath.types import Job
 from nrdf.viz.picture import Panel, draw_regions, render_details
@@ -75,7 +75,7 @@ def write_job_files(
         details = pool.submit(render_details, panel, list(panel.regions), _DETAIL).result()
         whole.result()
     seconds = {**result.seconds, "pictures": time.perf_counter() - start}
-    report = {"title": title, **report_of(result, limits), **origin}
+    report = {"title": title, **transfer_report(result, limits), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
     write_transfer_html(folder / HTML_REPORT, report, folder / PICTURE, details)
@@ -86,7 +86,7 @@ def write_job_files(
 
 
 def job_of(result: TransferResult) -> Job:
-    """The tool paths of a transfer, in the order in which they are driven."""
+    """The job of a transfer: its tool paths in the order of execution."""
     return Job(
         category=result.bound_knowledge.knowledge.category,
         frame=result.target.frame or "target",
@@ -112,7 +112,7 @@ def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
 
 
 def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
-    """What was taught, as it is on the target: the same format, for the same kind of use."""
+    """The knowledge for the target: its regions, and its processes as they were transferred."""
     taught = result.bound_knowledge.knowledge
     regions = []
     for region in taught.regions:

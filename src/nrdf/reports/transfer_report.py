@@ -1,4 +1,4 @@
-"""The report of a transfer: what was found, what is driven, how well, and what to look at."""
+"""The report of a transfer as plain values: regions, tool paths, metrics, warnings, limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.process.knowledge import Process
 from nrdf.process.limits import Limits, strict_warnings
-from nrdf.process.path_warnings import measure_warnings
+from nrdf.process.path_warnings import path_warnings
 from nrdf.process.transfer_result import PathResult, TransferResult
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.metrics import REASONS
@@ -23,15 +23,15 @@ SHORT_METRIC_COLUMNS = (
     "worked, %", "left out, %", "missed, %", "lines, mm", "step, mm", "turn, °", "off, mm",
     "time, s",
 )  # fmt: skip
-"""Shares of the whole region; the widest place between lines; the largest step and turn between
-waypoints; the distance from the object as given, 95th percentile."""
+"""For a terminal: shares of the whole region; worst line spacing; largest step and turn between
+waypoints; distance from the object as given, 95th percentile; cycle time."""
 
 
-def report_of(result: TransferResult, limits: Limits) -> dict[str, Any]:
+def transfer_report(result: TransferResult, limits: Limits) -> dict[str, Any]:
     """Everything of a transfer that a report says, as plain values; lengths in metres."""
     regions = result.regions
     paths = [_path(step, bool(regions[step.region].missing)) for step in result.paths]
-    driven = [step.metrics for step in result.paths if step.metrics is not None]
+    metrics = [step.metrics for step in result.paths if step.metrics is not None]
     strict = strict_warnings(result)
     # A skipped region is warned about as such.
     skipped = tuple(f"region '{name}':" for name, r in regions.items() if r.missing)
@@ -49,11 +49,11 @@ def report_of(result: TransferResult, limits: Limits) -> dict[str, Any]:
         "regions": _regions(result),
         "paths": paths,
         "total": {
-            "paths": len(driven),
-            "skipped": len(result.paths) - len(driven),
-            "path_length_m": sum(m.path_length_m for m in driven),
-            "process_length_m": sum(m.process_length_m for m in driven),
-            "cycle_time_s": sum(m.cycle_time_s for m in driven),
+            "paths": len(metrics),
+            "skipped": len(result.paths) - len(metrics),
+            "path_length_m": sum(m.path_length_m for m in metrics),
+            "process_length_m": sum(m.process_length_m for m in metrics),
+            "cycle_time_s": sum(m.cycle_time_s for m in metrics),
         },
         "warnings": warnings,
         "strict_warnings": strict,
@@ -101,7 +101,7 @@ def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
         content["lines"] = len({segment.line for segment in process_segments})
         content["waypoints"] = sum(len(segment.positions) for segment in step.path.segments)
         content["metrics"] = vars(step.metrics)
-        content["warnings"] += measure_warnings(process, step.metrics)
+        content["warnings"] += path_warnings(process, step.metrics)
     elif not skipped:
         content["warnings"].append(f"no tool path: {step.reason}")
     return content

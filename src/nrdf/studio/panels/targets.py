@@ -8,7 +8,7 @@ from nrdf.errors import NrdfError
 from nrdf.geometry.units import METRES
 from nrdf.process.limits import LOW_CONFIDENCE, Limits
 from nrdf.process.transfer_result import TransferResult
-from nrdf.reports.transfer_report import report_of, shares_in_words
+from nrdf.reports.transfer_report import shares_in_words, transfer_report
 from nrdf.studio.context import StudioContext
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs
@@ -123,7 +123,7 @@ class TargetsTab:
 
 def about_result(key: str, result: TransferResult, current: bool) -> str:
     """A target's tool paths and regions with their confidence, in Markdown."""
-    report = report_of(result, Limits())
+    report = transfer_report(result, Limits())
     outdated = "" if current else " *(of before your last change)*"
     minutes, seconds = divmod(round(report["total"]["cycle_time_s"]), 60)
     count = report["total"]["paths"]
