@@ -6,8 +6,10 @@ from functools import cache
 
 import numpy as np
 
+import nrdf
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import Similarity, up_axis, upright
+from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.simulate import ScanSettings, SimulatedScan, simulate_scan
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.tessellation import Tessellation, tessellate
@@ -43,3 +45,15 @@ def yaw_error(found: Similarity, true: Similarity) -> float:
     """Angle (degrees) between two poses' rotations."""
     cosine = (np.trace(found.rotation.T @ true.rotation) - 1) / 2
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+
+
+@cache
+def scorer(category: str) -> PoseScorer:
+    """That of the zoo's model."""
+    return PoseScorer(nrdf.load_model(category))
+
+
+@cache
+def full(category: str, seed: int, count: int = 5000):
+    """The surface of a family's member, with normals and coordinates."""
+    return get_family(category).member(seed).sample_surface(count, np.random.default_rng(0))

@@ -25,3 +25,10 @@ def step_shape(name: str, seed: int) -> Shape:
     queries = np.zeros((8, 3))
     return Shape(name, "step", "blocks", np.vstack(points), np.vstack(normals), queries,
                  np.ones(8, bool))  # fmt: skip
+
+
+def step_cloud() -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals of one, in random order."""
+    shape = step_shape("", 0)
+    order = np.random.default_rng(0).permutation(4096)
+    return shape.surface_points[order], shape.surface_normals[order]

@@ -9,8 +9,6 @@ from builders.scenes import UP, pose, scan_of
 from nrdf.errors import CloudError
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.clean import MOST_POINTS, STEPS, clean_scan, unthinned
-from nrdf.scans.floor import find_floor
-from nrdf.shapes.families import get_family
 
 CHAIR = 1_000_004
 FLOOR_ONLY = np.random.default_rng(0).uniform([-2, -2, 0], [2, 2, 1e-3], (5000, 3))
@@ -38,13 +36,6 @@ def test_the_floor_goes_and_the_object_stays(views, up):
     np.testing.assert_array_equal(cleaned.cloud.points, scan.cloud.points[cleaned.kept])
     step = {step.name: step for step in cleaned.steps}["floor"]
     assert step.removed >= (scan.face < 0).sum() and "carries the rest" in step.note
-
-
-@pytest.mark.parametrize("category", ["chair", "car", "plane", "table"])
-def test_no_part_of_an_object_passes_for_a_floor(category):
-    for seed in range(1_000_000, 1_000_004):
-        points = get_family(category).member(seed).sample_surface(6000, np.random.default_rng(0))
-        assert find_floor(points.points, np.array([0, 1.0, 0]), np.random.default_rng(0)) is None
 
 
 def test_the_larger_of_two_objects_is_kept():
