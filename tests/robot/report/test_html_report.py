@@ -13,7 +13,7 @@ if find_spec("mujoco") is None:
 from nrdf.robot.report.html_report import write_html_report
 
 PATH = {
-    "region": "top", "process": "sand <fine>", "reached": 58, "waypoints": 100, "pieces": 3,
+    "region": "top", "process": "sand <fine>", "reached": 58, "waypoints": 100, "joint_paths": 3,
     "collisions": [{}], "off_plan_99_m": 0.0004, "time_s": 12.0,
     "force": {"mean_n": 10.0, "spread_n": 0.5, "within": 0.97},
     "coverage": {
@@ -25,8 +25,8 @@ REPORT = {
     "title": "plate <1>",
     "robot": {"name": "arm & tool", "checked": ["reach < 2 m"]},
     "placement": {
-        "base_m": [0.75, 0.0, 0.3], "turns_used_rad": [0.0, 1.5707963], "stand_m": 0.1,
-        "object_lies": "as the job says",
+        "base_m": [0.75, 0.0, 0.3], "turntable_used_rad": [0.0, 1.5707963], "stand_m": 0.1,
+        "object_pose": "as the job says",
     },
     "object": "the scan",
     "paths": [PATH],
@@ -45,7 +45,7 @@ def test_a_report_says_how_the_job_went(tmp_path):
     for shown in (
         "plate &lt;1&gt; on arm &amp; tool", "58.0%", "of 100 waypoints reached", "2 min 5 s",
         "1 move touches the object", "sand &lt;fine&gt;", "10.0 ± 0.5 N", "0.4 mm", "0°, 90°",
-        "reach &lt; 2 m", "This is a simulation.", "nrdf simulate job", "2 turns of the turntable",
+        "reach &lt; 2 m", "This is a simulation.", "nrdf simulate job", "2 turntable angles",
     ):  # fmt: skip
         assert shown in page
     assert "<fine>" not in page and "<script" not in page and "<img" not in page
