@@ -17,11 +17,12 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.sampling import indices_in_subset
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.member import Member
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch, patches_of
-from nrdf.surface.surface import Surface
+from nrdf.surface.surface import Surface, surface_subset
 from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
 from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import Strategy
@@ -114,10 +115,12 @@ def evaluate_toolpaths(
     results = []
     for number, item in enumerate(objects):
         start = time.process_time()
-        surface = Surface(item.points, item.normals)
+        kept = surface_subset(item.points, item.normals)
+        surface = Surface(item.points[kept], item.normals[kept])
         surface.edges  # noqa: B018, what regions share
         shared = (time.process_time() - start) / len(item.regions)
-        for name, region in item.regions.items():
+        for name, indices in item.regions.items():
+            region = indices_in_subset(kept, indices, len(item.points))
             start = time.process_time()
             segments = plan(surface, region, strategy)
             seconds = shared + time.process_time() - start

@@ -19,7 +19,7 @@ from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.path_warnings import path_warnings
-from nrdf.process.transfer import ProcessTransfer, working
+from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.warp import warp_segments
 
 OFFSET = np.array([3.0, -1.0, 0.5])
@@ -269,7 +269,7 @@ def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
 def test_points_in_use_are_found_again(model):
     embedded = model.encode(cloud(count=20_000))
     some = np.arange(0, 20_000, 3)
-    found = working(embedded, some)
+    found = embedded.to_working(some)
     np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
 
 

@@ -13,7 +13,7 @@ from nrdf.surface.surface import Surface
 
 
 def whole(surface: Surface) -> np.ndarray:
-    return np.arange(surface.size)
+    return np.arange(len(surface.points))
 
 
 def test_a_flat_region_is_one_patch_with_its_surroundings():
@@ -32,7 +32,7 @@ def test_a_closed_tube_is_cut_lengthwise_and_every_point_is_some_patchs_own():
     patches = patches_of(surface, whole(surface))
     assert 2 <= len(patches) <= 4
     own = np.concatenate([patch.index[patch.label == OWN] for patch in patches])
-    assert len(own) == len(set(own)) > 0.98 * surface.size
+    assert len(own) == len(set(own)) > 0.98 * len(surface.points)
     assert all(np.ptp(patch.points[:, 2]) > 0.25 for patch in patches)
     assert all((patch.label == OTHER).any() for patch in patches)
 

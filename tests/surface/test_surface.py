@@ -8,7 +8,8 @@ import pytest
 from builders.surfaces import SPACING, board, dome, slats, two_sided
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
-from nrdf.surface.surface import MOST_POINTS, Surface, quadrics
+from nrdf.geometry.sampling import indices_in_subset
+from nrdf.surface.surface import MOST_POINTS, Surface, quadrics, surface_subset
 
 
 def test_the_spacing_of_random_points_is_that_of_their_density():
@@ -24,17 +25,23 @@ def test_edges_keep_to_one_side_of_a_thin_board():
     assert (i < j).all() and len(np.unique(surface.edges, axis=0)) == len(i)
 
 
+def surface_of(points, normals):
+    """The surface of a whole cloud."""
+    kept = surface_subset(points, normals)
+    return Surface(points[kept], normals[kept])
+
+
 def test_repeated_points_are_one_and_the_two_sides_of_a_sheet_are_two():
     points, normals = board()
     plain = Surface(points, normals)
-    again = Surface(np.concatenate([points, points[:40], points[:7]]),
-                    np.concatenate([normals, normals[:40], normals[:7]]))  # fmt: skip
+    again = surface_of(np.concatenate([points, points[:40], points[:7]]),
+                       np.concatenate([normals, normals[:40], normals[:7]]))  # fmt: skip
     np.testing.assert_array_equal(again.points, plain.points)
     np.testing.assert_array_equal(again.edges, plain.edges)
-    sheet = Surface(np.concatenate([points, points]), np.concatenate([normals, -normals]))
+    sheet = surface_of(np.concatenate([points, points]), np.concatenate([normals, -normals]))
     assert len(sheet.points) == 2 * len(points)
     nearly = points[:9] + 1e-9
-    surface = Surface(np.concatenate([points, nearly]), np.concatenate([normals, normals[:9]]))
+    surface = surface_of(np.concatenate([points, nearly]), np.concatenate([normals, normals[:9]]))
     i, j = surface.edges.T
     assert np.linalg.norm(surface.points[i] - surface.points[j], axis=1).min() > 1e-6
 
@@ -115,12 +122,12 @@ def test_a_quadric_is_fitted_exactly():
 def test_a_large_cloud_is_thinned_and_regions_follow():
     rng = np.random.default_rng(0)
     points = np.c_[rng.uniform(0, 1, (3 * MOST_POINTS, 2)), np.zeros(3 * MOST_POINTS)]
-    surface = Surface(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
-    assert len(surface.points) == MOST_POINTS
+    subset = surface_subset(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert len(subset) == MOST_POINTS
     chosen = np.flatnonzero(points[:, 0] < 0.5)
-    kept = surface.indices(chosen)
-    assert (surface.points[kept, 0] < 0.5).all()
-    assert len(kept) == (surface.points[:, 0] < 0.5).sum()
+    kept = indices_in_subset(subset, chosen, len(points))
+    assert (points[subset[kept], 0] < 0.5).all()
+    assert len(kept) == (points[subset, 0] < 0.5).sum()
 
 
 @pytest.mark.parametrize(
@@ -134,9 +141,9 @@ def test_a_large_cloud_is_thinned_and_regions_follow():
 )
 def test_a_region_that_is_not_of_the_cloud_is_refused(region, message):
     surface = Surface(*board())
-    assert surface.size == 1200 and SPACING == 0.01
+    assert len(surface.points) == 1200 and SPACING == 0.01
     with pytest.raises(ProcessError, match=message):
-        surface.indices(np.array(region))
+        surface.check_region(np.array(region))
 
 
 def test_points_without_normals_that_fit_are_refused():

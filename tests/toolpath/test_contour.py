@@ -17,7 +17,7 @@ def disc(radius: float = 0.2) -> Patch:
     points, normals = board(length=2 * radius, width=2 * radius, spacing=0.006)
     inside = np.linalg.norm(points[:, :2] - radius, axis=1) < radius
     surface = Surface(points[inside] - [radius, radius, 0.0], normals[inside])
-    return patches_of(surface, np.arange(surface.size))[0]
+    return patches_of(surface, np.arange(len(surface.points)))[0]
 
 
 def length(path: np.ndarray) -> float:
@@ -65,7 +65,7 @@ def test_a_spiral_on_a_disc_is_one_stroke_that_sinks_by_a_stepover_a_turn():
 def test_rings_go_round_a_gap():
     points, normals = slats(gap=0.06)
     surface = Surface(points, normals)
-    (patch,) = patches_of(surface, np.arange(surface.size))
+    (patch,) = patches_of(surface, np.arange(len(surface.points)))
     (rings,) = contour(patch, STEP, 0.0)
     for ring in rings:
         x, y, _ = patch.at(ring)[0].T
@@ -76,7 +76,7 @@ def test_where_rings_part_each_branch_has_a_spiral():
     points, normals = board()
     neck = (np.abs(points[:, 0] - 0.2) < 0.05) & (np.abs(points[:, 1] - 0.15) > 0.05)
     surface = Surface(points[~neck], normals[~neck])
-    (patch,) = patches_of(surface, np.arange(surface.size))
+    (patch,) = patches_of(surface, np.arange(len(surface.points)))
     (paths,) = spiral(patch, STEP, 0.0)
     assert len(paths) >= 3
     long_ones = sorted(map(length, paths))[-2:]

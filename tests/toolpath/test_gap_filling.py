@@ -12,7 +12,7 @@ from nrdf.toolpath.sampled_path import line_spacing, sample_lines
 from nrdf.toolpath.surface_path import SurfacePath
 
 SURFACE = Surface(*board(spacing=0.008))
-ALL = np.arange(SURFACE.size)
+ALL = np.arange(len(SURFACE.points))
 SPACING, RADIUS = 0.01, 0.025
 
 
@@ -97,7 +97,7 @@ def test_a_face_a_little_off_is_worked_but_single_points_are_not():
 
 def test_a_gap_round_a_bend_is_filled_on_the_surface():
     surface = Surface(*tube(radius=0.08, length=0.3, turn=2.0))
-    patches = patches_of(surface, np.arange(surface.size))
+    patches = patches_of(surface, np.arange(len(surface.points)))
     z = np.arange(0.03, 0.27, SPACING)
     lines = []
     for angle in (-0.35, 0.35):

@@ -19,7 +19,7 @@ from nrdf.toolpath.types import Segment
 
 STRATEGY = Strategy(stepover_m=0.04, spacing_m=0.01, tool_radius_m=0.025, feed_m_s=0.1)
 SURFACE = Surface(*board(spacing=0.008))
-REGION = np.arange(SURFACE.size)
+REGION = np.arange(len(SURFACE.points))
 DOWN = Rotation.from_euler("x", np.pi)
 
 
@@ -133,7 +133,9 @@ def test_the_way_between_waypoints_is_judged_as_well():
 
 def test_the_other_side_of_a_thin_board_is_not_reached():
     surface = Surface(*two_sided(thickness=0.003))
-    one = measure_path(surface, np.arange(surface.size), STRATEGY, lines(0.025, 0.075, 0.125))
+    one = measure_path(
+        surface, np.arange(len(surface.points)), STRATEGY, lines(0.025, 0.075, 0.125)
+    )
     assert one.coverage == pytest.approx(0.25, abs=0.02)
 
 
@@ -157,7 +159,10 @@ def test_spacing_is_measured_along_the_surface():
         drawn.append(process_segment(0.06 * outward + np.c_[np.zeros((27, 2)), along], turn))
         normals.append(np.tile(outward, (27, 1)))
     found = measure_path(
-        surface, np.arange(surface.size), STRATEGY, add_approach_retract(drawn, normals, STRATEGY)
+        surface,
+        np.arange(len(surface.points)),
+        STRATEGY,
+        add_approach_retract(drawn, normals, STRATEGY),
     )
     assert found.line_spacing_mean_m == pytest.approx(0.06, rel=0.02)  # the chord is 0.0575
 
@@ -168,7 +173,7 @@ def test_a_line_beyond_a_gap_is_no_neighbour():
     left = (points[:, 0] > 0.02) & (points[:, 0] < 0.38)
     surface = Surface(points[~(gap & left)], normals[~(gap & left)])
     found = measure_path(
-        surface, np.arange(surface.size), STRATEGY, lines(0.11, 0.19, x=(0.05, 0.35))
+        surface, np.arange(len(surface.points)), STRATEGY, lines(0.11, 0.19, x=(0.05, 0.35))
     )
     assert found.line_spacing_worst_m is None
 

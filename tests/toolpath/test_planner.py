@@ -23,7 +23,7 @@ SURFACES = {"board": board, "slats": slats, "dome": dome, "half tube": lambda: t
 
 def planned(points, normals, **changes) -> tuple[Segment, ...]:
     surface = Surface(points, normals)
-    return plan(surface, np.arange(surface.size), replace(STRATEGY, **changes))
+    return plan(surface, np.arange(len(surface.points)), replace(STRATEGY, **changes))
 
 
 def processes(segments) -> list[Segment]:
@@ -39,7 +39,7 @@ def frames(segment: Segment) -> np.ndarray:
 def test_what_every_path_keeps_to(shape, trajectory):
     points, normals = SURFACES[shape]()
     surface = Surface(points, normals)
-    region = np.arange(surface.size)
+    region = np.arange(len(surface.points))
     strategy = replace(STRATEGY, trajectory=trajectory)
     segments = plan(surface, region, strategy)
     lines = processes(segments)
@@ -67,7 +67,7 @@ def test_what_every_path_keeps_to(shape, trajectory):
 @pytest.mark.parametrize("shape", SURFACES)
 def test_raster_lines_are_no_farther_apart_than_asked(shape):
     surface = Surface(*SURFACES[shape]())
-    region = np.arange(surface.size)
+    region = np.arange(len(surface.points))
     found = measure_path(surface, region, STRATEGY, plan(surface, region, STRATEGY))
     # A dome cannot be unrolled without stretch.
     assert found.line_spacing_worst_m < (1.2 if shape == "dome" else 1.1) * STRATEGY.stepover_m
@@ -118,7 +118,7 @@ def test_each_side_of_a_thin_board_is_worked_from_its_own_side():
     (z,) = {tuple(p) for line in processes(plan(surface, top, STRATEGY))
             for p in np.round(np.c_[line.positions[:, 2], frames(line)[:, 2, 2]], 6)}  # fmt: skip
     assert z == (0.0, -1.0)
-    both = processes(plan(surface, np.arange(surface.size), STRATEGY))
+    both = processes(plan(surface, np.arange(len(surface.points)), STRATEGY))
     sides = [np.round(np.c_[line.positions[:, 2], frames(line)[:, 2, 2]], 6) for line in both]
     assert {tuple(np.unique(side, axis=0)[0]) for side in sides} == {(0.0, -1.0), (-0.004, 1.0)}
 

@@ -54,7 +54,7 @@ def test_a_place_next_to_an_edge_is_on_the_face_of_its_tool():
 
 def test_a_line_that_is_missing_on_a_bar_is_missed():
     surface = bar()
-    patches = patches_of(surface, np.arange(surface.size))
+    patches = patches_of(surface, np.arange(len(surface.points)))
     lines = [line for k, line in enumerate(round_the_bar()) if k not in (1, 2)]
     found = line_spacing(patches, sample_lines(lines, 0.025, STEPOVER), STEPOVER)
     assert found.distance.max() > 1.5 * STEPOVER

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import torch
 
+from nrdf.errors import CloudError
 from nrdf.field.base import Field
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.field.kind_network import KindNetwork, find_kind_network
 from nrdf.geometry.canonical import MIRROR, canonical_transform
 from nrdf.geometry.normals import estimate_normals
-from nrdf.geometry.sampling import downsample
+from nrdf.geometry.sampling import distinct_points, downsample
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import check_cloud
 from nrdf.io.inputs import as_cloud
@@ -79,6 +80,13 @@ class CloudEncoder:
         if pose is None:
             pose = Similarity(np.eye(3), *canonical_transform(cloud.points))
         working = downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        sides = None if cloud.normals is None else cloud.normals[working]
+        working = working[distinct_points(cloud.points[working], sides)]
+        if len(working) < MINIMUM_POINTS:
+            raise CloudError(
+                f"the cloud has {len(cloud)} points, but only {len(working)} in different places; "
+                f"at least {MINIMUM_POINTS} are needed: scan or sample it more densely"
+            )
         points = pose.to_canonical(cloud.points[working])
         seconds["normalise"] = time.perf_counter() - start
         start = time.perf_counter()

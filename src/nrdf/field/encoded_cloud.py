@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.sampling import downsample
+from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.visibility import seen_from_both_sides
 from nrdf.io.cloud import PointCloud
@@ -58,6 +58,11 @@ class EncodedCloud:
     def canonical_normals(self, normals: np.ndarray) -> np.ndarray:
         """Directions (m, 3) of the cloud's own frame in the canonical one."""
         return normals @ self.pose.rotation
+
+    def to_working(self, indices: np.ndarray) -> np.ndarray:
+        """A region given by `indices` (m,) into `cloud.points`, as indices (k,), ascending, of the
+        working points."""
+        return indices_in_subset(self.working, indices, len(self.cloud.points))
 
     def to_all(self, selected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Selected working points as indices of the whole cloud, and which working point each

@@ -8,6 +8,7 @@ from nrdf.geometry.canonical import bounding_box
 
 _LARGEST_GRID = 1 << 25  # cells of a dense voxel grid, 128 MiB of indices
 _CHUNK = 1 << 18  # points handled at a time
+_SAME_PLACE = 1e-7  # in shares of the longest side: points nearer than that are in one place
 
 
 def downsample(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -50,6 +51,36 @@ def downsample(points: np.ndarray, count: int, rng: np.random.Generator) -> np.n
         rest = np.setdiff1d(np.arange(total), chosen)
         chosen = np.concatenate([chosen, rng.choice(rest, count - len(chosen), replace=False)])
     return np.sort(rng.choice(chosen, count, replace=False))
+
+
+def distinct_points(points: np.ndarray, normals: np.ndarray | None = None) -> np.ndarray:
+    """Indices (k,), ascending, of points (n, 3) without those in the place of another one.
+
+    With normals (n, 3), one point stays for each of the two sides that coincident ones face.
+    """
+    low = points.min(axis=0)
+    side = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
+    place = np.round((points - low) / (_SAME_PLACE * side)).astype(np.int64)
+    _, first, group = np.unique(place, axis=0, return_index=True, return_inverse=True)
+    if len(first) == len(points):
+        return np.arange(len(points))
+    if normals is None:
+        return np.sort(first)
+    away = np.einsum("na,na->n", normals, normals[first[group.ravel()]]) < 0
+    opposite = np.flatnonzero(away)
+    _, once = np.unique(group.ravel()[opposite], return_index=True)
+    return np.sort(np.concatenate([first, opposite[once]]))
+
+
+def indices_in_subset(subset: np.ndarray, indices: np.ndarray, count: int) -> np.ndarray:
+    """Some of a cloud's `count` points, by their `indices` (m,), as positions in a subset of it.
+
+    subset: (k,) indices into the cloud. Returns positions in `subset`, ascending; points that are
+    not in it are left out.
+    """
+    chosen = np.zeros(count, bool)
+    chosen[indices] = True
+    return np.flatnonzero(chosen[subset])
 
 
 def one_per_cell(points: np.ndarray, lowest: np.ndarray, cell: float) -> np.ndarray:

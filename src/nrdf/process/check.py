@@ -11,7 +11,7 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
-from nrdf.geometry.sampling import downsample
+from nrdf.geometry.sampling import distinct_points, downsample, indices_in_subset
 from nrdf.geometry.units import in_words
 from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
@@ -56,10 +56,13 @@ def check_knowledge(
     kept = downsample(bound_knowledge.cloud.points, WORKING_POINTS, np.random.default_rng(0))
     cloud = bound_knowledge.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
-    surface = Surface(cloud.points, normals)
+    distinct = distinct_points(cloud.points, normals)
+    surface = Surface(cloud.points[distinct], normals[distinct])
     given = given_surface(with_normals_of(bound_knowledge.cloud, replace(cloud, normals=normals)))
+    count = len(bound_knowledge.cloud)
     regions = {
-        name: np.flatnonzero(np.isin(kept, of)) for name, of in bound_knowledge.regions.items()
+        name: indices_in_subset(kept[distinct], indices, count)
+        for name, indices in bound_knowledge.regions.items()
     }
     steps = [(region.name, p) for region in bound_knowledge.knowledge.regions for p in region.steps]
     checked = []

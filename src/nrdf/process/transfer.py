@@ -121,7 +121,7 @@ class ProcessTransfer:
             for warning in (*unit_warnings, *kind.warnings):
                 log.warning("%s", warning)
         matches = self.reference.retrieve_all(regions, encoded, check=False)
-        matches |= _marked_matches(marked or {}, matches, encoded.cloud)
+        matches |= _marked_matches(marked or {}, matches, encoded)
         found = {
             n: FoundRegion(n, m, reason_to_skip(m, min_confidence)) for n, m in matches.items()
         }
@@ -166,7 +166,7 @@ class ProcessTransfer:
             if process.waypoints is not None:
                 segments = taught_segments(process, surface)
             else:
-                inside = working(self.reference.reference, self.bound_knowledge.regions[region])
+                inside = self.reference.reference.to_working(self.bound_knowledge.regions[region])
                 once = replace(strategy_of(process), passes=1)
                 segments = tuple(s for s in plan(surface, inside, once) if s.kind == "process")
             self._segments[region, number] = segments
@@ -230,7 +230,7 @@ class ProcessTransfer:
         if found.missing:
             return replace(made, reason=found.missing)
         surface = correspondence.target_surface
-        inside = working(correspondence.target, found.match.indices)
+        inside = found.match.working
         if process.direction is not None:
             indices = self.bound_knowledge.regions[region]
             direction = correspondence.map_direction(indices, np.array(process.direction))
@@ -289,10 +289,10 @@ def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTr
 
 
 def _marked_matches(
-    marked: Mapping[str, ArrayLike], found: Mapping[str, Match], target: PointCloud
+    marked: Mapping[str, ArrayLike], found: Mapping[str, Match], encoded: EncodedCloud
 ) -> dict[str, Match]:
     """Matches of regions that a person has marked on the target: they are certain."""
-    matches = {}
+    matches, target = {}, encoded.cloud
     for name, region in marked.items():
         if name not in found:
             raise RegionError(unknown_name("taught region", name, list(found)))
@@ -302,7 +302,13 @@ def _marked_matches(
             indices = np.arange(0) if absent else np.unique(region_indices(values, target))
         except RegionError as error:
             raise RegionError(f"region '{name}' on the target: {error}") from None
-        matches[name] = Match(indices, found[name].points, np.ones(len(indices)), "marked")
+        matches[name] = Match(
+            indices=indices,
+            points=found[name].points,
+            confidence=np.ones(len(indices)),
+            method="marked",
+            working=encoded.to_working(indices),
+        )
     return matches
 
 
@@ -312,10 +318,3 @@ def with_normals(encoded: EncodedCloud) -> PointCloud:
         return encoded.cloud
     normals = encoded.original_normals(encoded.normals)
     return replace(encoded.cloud, normals=normals[encoded.nearest_working])
-
-
-def working(encoded: EncodedCloud, indices: np.ndarray) -> np.ndarray:
-    """Indices of a whole cloud's points as indices of the points that the field works on."""
-    inside = np.zeros(len(encoded.cloud), bool)
-    inside[indices] = True
-    return np.flatnonzero(inside[encoded.working])

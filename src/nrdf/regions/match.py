@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ class Match:
         region that is to be expected (`nrdf.regions.presence`).
     method: "mask" or "points"; "marked" where a person has marked it on the target.
     presence: whether the target has the region and the scan shows it.
+    working: (w,) the same region as indices of the encoded target's working points, ascending.
     """
 
     indices: np.ndarray
@@ -31,6 +32,7 @@ class Match:
     confidence: np.ndarray
     method: str
     presence: Presence = FOUND
+    working: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def score(self) -> float:
@@ -48,5 +50,9 @@ class Match:
             scaled = self.confidence * (presence.overlap / max(self.score, 1e-9))
             return replace(self, presence=presence, confidence=np.minimum(scaled, 1.0))
         return replace(
-            self, indices=self.indices[:0], confidence=self.confidence[:0], presence=presence
+            self,
+            indices=self.indices[:0],
+            confidence=self.confidence[:0],
+            presence=presence,
+            working=self.working[:0],
         )

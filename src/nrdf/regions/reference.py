@@ -238,9 +238,8 @@ class EncodedReference:
         working points (m,), and the reference's working points (m, k) nearest to where they map.
         """
         inside = self._working_mask(indices)
-        found = np.zeros(len(target.cloud.points), bool)
-        found[match.indices] = True
-        found = found[target.working]
+        found = np.zeros(len(target.points), bool)
+        found[match.working] = True
         chosen, nearest = mapped_back
         returned = inside[nearest[found[chosen]]]
         evidence = evidence_of(
@@ -277,6 +276,7 @@ class EncodedReference:
                 points=target.original(points),
                 confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
                 method="mask",
+                working=np.flatnonzero(found),
             )
         return matches
 
@@ -289,14 +289,14 @@ class EncodedReference:
             points=target.original(mapped.points),
             confidence=np.clip(trust[first], 0.0, 1.0),
             method="points",
+            working=np.unique(nearest),
         )
 
     def _working_mask(self, indices: np.ndarray) -> np.ndarray:
         """Which working points of the reference a region holds, (n,) bool."""
         reference = self.reference
-        inside = np.zeros(len(reference.cloud.points), bool)
-        inside[indices] = True
-        mask = inside[reference.working]
+        mask = np.zeros(len(reference.points), bool)
+        mask[reference.to_working(indices)] = True
         if mask.any():
             return mask
         # The region fell between the points that were kept: its nearest ones stand for it.

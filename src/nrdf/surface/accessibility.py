@@ -14,7 +14,7 @@ _INSIDE = 0.5  # winding number
 
 
 def accessible_points(surface: Surface, region: np.ndarray, clearance_m: float) -> np.ndarray:
-    """The points of a region, indices (k,) of the surface's cloud, with nothing close before them.
+    """The points of a region, indices (k,) of the surface's points, with nothing close before them.
 
     Along its normal, up to `clearance_m` away, a point must meet only what is outside of the
     object: in a crevice between two parts, or beneath a part that lies on another, it does not.
@@ -22,16 +22,17 @@ def accessible_points(surface: Surface, region: np.ndarray, clearance_m: float) 
     """
     if clearance_m <= 0.0:
         return region
-    if clearance_m not in surface.blocked:
-        surface.blocked[clearance_m] = _blocked(surface, clearance_m)
-    inside = surface.indices(region)
-    free = inside[~surface.blocked[clearance_m][inside]]
+    key = "blocked", clearance_m
+    if key not in surface.found:
+        surface.found[key] = _blocked(surface, clearance_m)
+    inside = surface.check_region(region)
+    free = inside[~surface.found[key][inside]]
     if not len(free):
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
             f"{in_words('clearance_m', clearance_m)} free before the surface; give less, or 0"
         )
-    return surface.kept[free]
+    return np.asarray(free)
 
 
 def _blocked(surface: Surface, clearance_m: float) -> np.ndarray:

@@ -126,16 +126,17 @@ class Patch:
 
 
 def patches_of(surface: Surface, region: np.ndarray) -> tuple[Patch, ...]:
-    """The patches of a region, indices (k,) into the surface's cloud, the largest first.
+    """The patches of a region, indices (k,) of the surface's points, the largest first.
 
     Found once for each region of a surface. Raises ProcessError for a region that is empty, not of
     this cloud, or whose points are too few or too scattered.
     """
-    own = surface.indices(region)
-    key = own.tobytes()
-    if key not in surface.patches:
-        surface.patches[key] = _cut(surface, own)
-    return surface.patches[key]
+    own = surface.check_region(region)
+    key = "patches", own.tobytes()
+    if key not in surface.found:
+        surface.found[key] = _cut(surface, own)
+    patches: tuple[Patch, ...] = surface.found[key]
+    return patches
 
 
 def inside_margin(
@@ -143,7 +144,7 @@ def inside_margin(
 ) -> np.ndarray:
     """Indices of the region's points that are not in the margin along its border."""
     inside = np.zeros(len(surface.points), bool)
-    inside[surface.indices(region)] = True
+    inside[surface.check_region(region)] = True
     if margin > 0.0:
         for patch in patches:
             own = patch.label == OWN

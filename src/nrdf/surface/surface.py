@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
-from nrdf.geometry.sampling import downsample
-
-if TYPE_CHECKING:
-    from nrdf.surface.patch import Patch
+from nrdf.geometry.sampling import distinct_points, downsample
 
 MOST_POINTS = 30_000
 """A larger cloud is thinned evenly: finer points than a tool can follow only cost time."""
@@ -26,19 +23,18 @@ _FITTED, _LEAST = 20, 4
 _SURE = 0.5  # share of one of fewer points that are a plane, as at the end of a thin part
 _SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
 _COINCIDENT = 1e-4  # spacings within which two points are in one place
-_SAME_PLACE = 1e-7  # the same in shares of the longest side, where the spacing is not known yet
 _AT_ONCE = 8192  # places: what is known of each takes many times its own memory
 _ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
-    """An object's cloud with outward normals, as a surface to work on.
+    """An object's points with outward normals, as a surface to work on.
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
-    part are told apart by their normals alone. kept: (n,) indices of the points in the cloud as
-    given: all but repeated ones, thinned where there are very many. patches, blocked: what
-    `nrdf.surface.patch` and `room` have found out, for their next call. Raises ProcessError if
-    the two do not fit each other, are not finite, or are fewer than 8.
+    part are told apart by their normals alone. There is one row for each point given, so a region
+    is an array of indices of the points given; none of them should be in the place of another
+    (`surface_subset`). found: what other modules have found out about the surface, for their next
+    call. Raises ProcessError if the two do not fit each other, are not finite, or are fewer than 8.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray) -> None:
@@ -52,30 +48,24 @@ class Surface:
             raise ProcessError(
                 f"a surface needs at least 8 finite points with normals, not {len(points)}"
             )
-        self.size = len(points)
-        kept = _distinct(points, normals)
-        self.kept = kept[downsample(points[kept], MOST_POINTS, np.random.default_rng(0))]
-        self.points = points[self.kept]
-        self.normals = unit_vectors(normals[self.kept])
-        self.patches: dict[bytes, tuple[Patch, ...]] = {}
-        self.blocked: dict[float, np.ndarray] = {}
+        self.points = points
+        self.normals = unit_vectors(normals)
+        self.found: dict[Any, Any] = {}
 
-    def indices(self, region: np.ndarray) -> np.ndarray:
-        """Indices (k,), ascending, of `points` for a region (indices into the cloud as given).
+    def check_region(self, region: np.ndarray) -> np.ndarray:
+        """A region's indices (k,) of `points`, ascending, each once.
 
-        Raises ProcessError if it is empty or does not fit the cloud.
+        Raises ProcessError if it is empty or does not fit the surface.
         """
         region = np.unique(np.asarray(region))
         if region.size == 0 or not np.issubdtype(region.dtype, np.integer):
             raise ProcessError("a region must be the indices of one or more of the cloud's points")
-        if region[0] < 0 or region[-1] >= self.size:
+        if region[0] < 0 or region[-1] >= len(self.points):
             raise ProcessError(
                 f"a region has indices {region[0]} to {region[-1]}; the cloud's are 0 to "
-                f"{self.size - 1}"
+                f"{len(self.points) - 1}"
             )
-        mask = np.zeros(self.size, bool)
-        mask[region] = True
-        return np.flatnonzero(mask[self.kept])
+        return region
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -277,19 +267,14 @@ class Surface:
         return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
 
 
-def _distinct(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Indices, ascending, of points (n, 3) without those in the place of another that faces the
-    same side by its normal (n, 3): one stays for each side."""
-    low = points.min(axis=0)
-    side = max(float((points.max(axis=0) - low).max()), np.finfo(float).tiny)
-    place = np.round((points - low) / (_SAME_PLACE * side)).astype(np.int64)
-    _, first, group = np.unique(place, axis=0, return_index=True, return_inverse=True)
-    if len(first) == len(points):
-        return np.arange(len(points))
-    away = np.einsum("na,na->n", normals, normals[first[group.ravel()]]) < 0
-    opposite = np.flatnonzero(away)
-    _, once = np.unique(group.ravel()[opposite], return_index=True)
-    return np.sort(np.concatenate([first, opposite[once]]))
+def surface_subset(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Indices (k,), ascending, of the points (n, 3) of a whole cloud that a surface is made of.
+
+    Points that repeat another one are left out, and very many are thinned to `MOST_POINTS`.
+    """
+    distinct = distinct_points(points, normals)
+    kept = downsample(points[distinct], MOST_POINTS, np.random.default_rng(0))
+    return np.asarray(distinct[kept])
 
 
 def typical_spacing(distance: np.ndarray, number: int) -> float:

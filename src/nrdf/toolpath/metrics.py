@@ -60,11 +60,11 @@ class RegionPoints:
         surface: Surface, region: np.ndarray, clearance_m: float, edge_margin_m: float
     ) -> RegionPoints:
         """region: indices (k,) of the surface's points. Raises ProcessError as planning does."""
-        points = surface.indices(region)
+        points = surface.check_region(region)
         accessible = accessible_points(surface, region, clearance_m)
         patches = patches_of(surface, accessible)
         inside = inside_margin(surface, accessible, patches, edge_margin_m)
-        free = np.isin(points, surface.indices(accessible))
+        free = np.isin(points, accessible)
         return RegionPoints(points, free, np.isin(points, inside), patches)
 
     def coverage(self, reached: np.ndarray) -> Coverage:

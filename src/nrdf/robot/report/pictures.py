@@ -254,7 +254,8 @@ def _parts(
             metrics = simulated.metrics
             found = np.where(metrics.worked, 1, np.where(metrics.wanted, 2, 3))
             region = bound_knowledge.regions[simulated.path.region]
-            nearest = cKDTree(points[metrics.region_points]).query(points[region])[1]
+            on_surface = result.simulation_job.surface.points[metrics.region_points]
+            nearest = cKDTree(on_surface).query(points[region])[1]
             label[region] = found[nearest]
     normals = bound_knowledge.cloud.normals
     corners = distance_field.vertices[distance_field.faces]

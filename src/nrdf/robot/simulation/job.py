@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.sampling import indices_in_subset
 from nrdf.geometry.similarity import up_axis
 from nrdf.process.bound_knowledge import BoundKnowledge, read_bound_knowledge
 from nrdf.reports.job_folder import KNOWLEDGE
 from nrdf.robot.model.cell import upright_rotation
-from nrdf.surface.surface import Surface
+from nrdf.surface.surface import Surface, surface_subset
 from nrdf.toolpath.file import FILE, read_toolpaths
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Job, ToolPath
@@ -47,6 +49,20 @@ class SimulationJob:
         normals = self.bound_knowledge.cloud.normals
         assert normals is not None  # read_simulation_job lets no other pass
         return normals
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The target's surface, without repeated points, and thinned where there are very many."""
+        return Surface(self.points[self._subset], self.normals[self._subset])
+
+    def region(self, name: str) -> np.ndarray:
+        """A region as indices (k,) of the surface's points."""
+        indices = self.bound_knowledge.regions[name]
+        return indices_in_subset(self._subset, indices, len(self.points))
+
+    @cached_property
+    def _subset(self) -> np.ndarray:
+        return surface_subset(self.points, self.normals)
 
 
 def read_simulation_job(folder: str | Path, up: str | None = None) -> SimulationJob:
@@ -108,7 +124,7 @@ def _orientation(job: Job, up: str | None) -> tuple[np.ndarray, str, bool]:
 
 def _check_frame(simulation_job: SimulationJob) -> None:
     """Raise ProcessError where the tool paths are not on the object."""
-    surface = Surface(simulation_job.points, simulation_job.normals)
+    surface = simulation_job.surface
     for path, strategy in zip(simulation_job.job.paths, simulation_job.strategies, strict=True):
         positions = [s.positions for s in path.segments if s.kind == "process"]
         if not positions:

@@ -41,11 +41,10 @@ class PathMetrics:
     of reached waypoints, of the planned joints, against the axis that they are planned with;
     tilted: waypoints where that is not the tool path's own, by max_tilt_rad at most. planned,
     executed, achieved: coverage of the whole region by the tool path, by the part of it that is
-    executed, and in the simulation. region_points: (k,) indices of the region's points on the
-    target (of a large one, those that are kept); worked, wanted: (k,) those worked in the
-    simulation, and those that are not left out. force_*: while the tool moves along its lines; None
-    where nothing is pressed. off_plan_99_m: of the tool from its line, without the offset along the
-    axis.
+    executed, and in the simulation. region_points: (k,) the region's points, indices of the job's
+    surface; worked, wanted: (k,) those worked in the simulation, and those that are not left out.
+    force_*: while the tool moves along its lines; None where nothing is pressed. off_plan_99_m: of
+    the tool from its line, without the offset along the axis.
     """
 
     verdicts: tuple[np.ndarray, ...]
@@ -95,7 +94,7 @@ def measure_path(
 ) -> PathMetrics:
     """Metrics of a tool path that was executed.
 
-    region: indices (k,) of its points on the target. covered, reachability: as `plan_joint_paths`
+    region: indices (k,) of the surface's points. covered, reachability: as `plan_joint_paths`
     returns them.
     """
     groups = path.groups
@@ -139,7 +138,7 @@ def measure_path(
         planned=region_points.coverage(reached(*_sampled(planned, height))),
         executed=region_points.coverage(reached(*_sampled(executed, height))),
         achieved=region_points.coverage(worked),
-        region_points=surface.kept[region_points.points],
+        region_points=region_points.points,
         worked=worked & region_points.accessible,
         wanted=region_points.accessible & region_points.inside_margin,
         force_commanded_n=commanded,

@@ -22,7 +22,6 @@ from nrdf.robot.simulation.collision_rejection import run
 from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.robot.simulation.job import SimulationJob
 from nrdf.robot.simulation.metrics import PathMetrics, measure_path
-from nrdf.surface.surface import Surface
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import ToolPath
 
@@ -84,7 +83,7 @@ def simulate(
     """
     rng = np.random.default_rng(seed)
     clock = _Clock()
-    surface = Surface(simulation_job.points, simulation_job.normals)
+    surface = simulation_job.surface
     progress("shape of the object")
     if distance_field is None:
         distance_field = distance_field_from_points(simulation_job.points, simulation_job.normals)
@@ -118,7 +117,7 @@ def simulate(
         done = run(
             cell, path.region, path.groups, joint_paths, home, library, rng, surface, shift, clock
         )
-        region = simulation_job.bound_knowledge.regions[path.region]
+        region = simulation_job.region(path.region)
         metrics = measure_path(
             region, surface, path, strategy, cell, done.program, covered, reachability, done.logs
         )

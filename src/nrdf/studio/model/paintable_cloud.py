@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
-from nrdf.geometry.sampling import downsample
+from nrdf.geometry.sampling import distinct_points, downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.studio.model.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
@@ -26,7 +26,9 @@ class PaintableCloud:
 
     def __init__(self, cloud: PointCloud) -> None:
         self.cloud = cloud
-        self.shown = downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        shown = downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0))
+        sides = None if cloud.normals is None else cloud.normals[shown]
+        self.shown = shown[distinct_points(cloud.points[shown], sides)]
         self.points = cloud.points[self.shown]
         given = cloud.normals
         self.normals = estimate_normals(self.points) if given is None else given[self.shown]
