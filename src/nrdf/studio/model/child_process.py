@@ -1,4 +1,4 @@
-"""Work in a process of its own: pages outlive whatever ends it, and it can be ended at any time."""
+"""Work in a child process, which can be ended at any time and may crash without harm."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from nrdf.studio.model.worker import Cancelled, Progress
 
 log = logging.getLogger(__name__)
 
-_LOOKS_EVERY_S = 0.2  # whether the person has cancelled
+_POLL_S = 0.2  # how often to look whether the work is cancelled
 _PATIENCE_S = 5.0  # for a process that has been told to end
 
 
-def _nothing(said: Any, *more: Any) -> None:
-    """Progress, or a phase, that nobody looks at."""
+def _ignore(value: Any, *more: Any) -> None:
+    """Ignores progress or a phase."""
 
 
 class ChildProcess:
@@ -30,7 +30,7 @@ class ChildProcess:
     ("progress", (done, all)), ("phase", words), and at last ("made", value), ("cancelled", None),
     ("refused", NrdfError) or ("failed", traceback).
 
-    gone: makes the error that says that it has ended by itself, of what has ended it.
+    gone: makes the error for a process that has ended by itself, from the reason.
     """
 
     def __init__(
@@ -48,28 +48,28 @@ class ChildProcess:
         """Whether the process runs."""
         return self._process.is_alive()
 
-    def ask(self, order: Any, progress: Progress) -> Any:
-        """Give an order, and wait for what is made of it; None tells the process to give it up.
+    def request(self, request: Any, progress: Progress) -> Any:
+        """Send a request, and wait for its result; None, sent later, cancels it.
 
-        Raises what the process refuses with, what `progress` raises, and what `gone` makes.
+        Raises the NrdfError of the process, what `progress` raises, and what `gone` makes.
         """
-        self._send(order)
+        self._send(request)
         try:
             return self.wait(progress)
         except Cancelled:
             if not self._ended:
                 self._send(None)
                 with contextlib.suppress(Cancelled):
-                    self.wait(_nothing)
+                    self.wait(_ignore)
             raise
 
-    def wait(self, progress: Progress, say: Callable[[str], None] = _nothing) -> Any:
-        """What the process answers; `say` is told its phases. Raises as `ask` does."""
+    def wait(self, progress: Progress, say: Callable[[str], None] = _ignore) -> Any:
+        """Wait for a result; `say` gets the phases of the work. Raises as `request` does."""
         share = (0, 1)
         while True:
             progress(*share)
             try:
-                if not self._pipe.poll(_LOOKS_EVERY_S):
+                if not self._pipe.poll(_POLL_S):
                     continue
                 kind, value = self._pipe.recv()
             except (EOFError, OSError):
@@ -89,7 +89,7 @@ class ChildProcess:
                 raise RuntimeError(value.strip().splitlines()[-1])
 
     def end(self) -> None:
-        """End the process; what it has written half is removed. Who waits for it is cancelled."""
+        """End the process; half-written files are removed. Who waits for it gets Cancelled."""
         self._ended = True
         self._pipe.close()
         self._process.terminate()
@@ -98,9 +98,9 @@ class ChildProcess:
             self._process.kill()
             self._process.join()
 
-    def _send(self, order: Any) -> None:
+    def _send(self, message: Any) -> None:
         try:
-            self._pipe.send(order)
+            self._pipe.send(message)
         except OSError:
             raise self._lost() from None
 
@@ -112,7 +112,7 @@ class ChildProcess:
 
 
 def answer(pipe: Connection, make: Callable[[], Any]) -> None:
-    """In the process: send what is made, or why it is not."""
+    """In the child process: send the result, or why there is none."""
     try:
         pipe.send(("made", make()))
     except Cancelled:
@@ -126,7 +126,7 @@ def answer(pipe: Connection, make: Callable[[], Any]) -> None:
 
 
 def progress_of(pipe: Connection) -> Progress:
-    """In the process: progress that is sent, and raises Cancelled once the order is given up."""
+    """In the child process: sends progress, and raises Cancelled once the request is cancelled."""
 
     def progress(done: int, total: int) -> None:
         if pipe.poll():
@@ -138,11 +138,11 @@ def progress_of(pipe: Connection) -> Progress:
 
 
 def _run(serve: Callable[..., None], pipe: Connection, *args: Any) -> None:
-    # As an exception, so that what is written half is removed.
+    # As an exception, so that half-written files are removed.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         serve(pipe, *args)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends already
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it is ending already
 
 
 def _in_words(code: int | None) -> str:

@@ -1,7 +1,7 @@
-"""What takes long, or reads what strangers have made: plans, transfers, descriptors and uploads.
+"""What takes long or reads untrusted files: plans, transfers, descriptors and uploads.
 
-It can be done in a process of its own, so that whatever ends that process (a fault of native code,
-a lack of memory) leaves the studio, and all that a person has made, alive.
+It can run in a child process. Whatever ends that process (a crash of native code, a lack of memory)
+leaves the studio and the session alive.
 """
 
 from __future__ import annotations
@@ -37,20 +37,22 @@ _NOT_SENT = PointCloud(np.zeros((0, 3)))
 
 
 class ComputingProcessEnded(NrdfError):
-    """The process that computes has ended by itself."""
+    """The child process that computes has ended by itself."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A step on the reference. fault: why there is no plan; checked: None where the step itself is
-    wrong."""
+    """A process step, planned on the reference.
+
+    fault: why there is no plan, "" where there is one; checked: None where the step is invalid.
+    """
 
     fault: str
     checked: CheckedProcess | None = None
 
     @property
     def lines(self) -> list[np.ndarray]:
-        """Places (m, 3) on the surface that each line works."""
+        """The contact points (m, 3) of each line, on the surface, m."""
         if self.checked is None:
             return []
         height = self.checked.process.standoff_m
@@ -63,11 +65,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class CorrespondenceFeatures:
-    """What the descriptors of several objects say, by
-    `nrdf.regions.reference.EncodedReference.described`.
+    """Correspondence features of several objects, by
+    `nrdf.regions.reference.EncodedReference.correspondence_features`.
 
-    objects: (n, 6) of the points that are shown, by object. reference: (k, 6) of the reference's
-    own points; nearest: (m,) which of them stands for each of its cloud's points.
+    objects: (n, 6) of the shown points, by object. reference: (k, 6) of the reference's working
+    points; nearest: (m,) the working point of each point of its cloud.
     """
 
     objects: Mapping[str, np.ndarray]
@@ -75,16 +77,16 @@ class CorrespondenceFeatures:
     nearest: np.ndarray
 
     def distances(self, index: int) -> dict[str, np.ndarray]:
-        """How far each object's shown points (k,) are from a shown point of the reference."""
-        here = self.reference[self.nearest[index]]
-        return {key: np.linalg.norm(said - here, axis=1) for key, said in self.objects.items()}
+        """Descriptor distances (k,) of each object's shown points to one of the reference."""
+        picked = self.reference[self.nearest[index]]
+        return {key: np.linalg.norm(f - picked, axis=1) for key, f in self.objects.items()}
 
 
 class LocalComputing:
-    """Computes for one document after the other, and keeps what the next can use.
+    """Computes in this process, for one document after the other, and keeps what the next can use.
 
-    load: gives the model of a category. Every order is a method, by name and arguments; `share`
-    comes before those that are about objects.
+    load: gives the model of a category. `use_objects` comes before the methods that are about
+    objects, which are named by their files.
     """
 
     def __init__(self, load: Callable[[str], Model]) -> None:
@@ -92,29 +94,31 @@ class LocalComputing:
         self._models: dict[str, Model] = {}
         self._clouds: dict[str, PointCloud] = {}
         self._paintables: dict[str, PaintableCloud] = {}
-        self._embedded: dict[tuple[str, str], EncodedCloud] = {}
-        self._said: dict[tuple[str, str, str], np.ndarray] = {}
-        self._teacher: tuple[int, ProcessTransfer] | None = None
+        self._encoded: dict[tuple[str, str], EncodedCloud] = {}
+        self._features: dict[tuple[str, str, str], np.ndarray] = {}
+        self._transfer_process: tuple[int, ProcessTransfer] | None = None
 
-    def ask(self, name: str, *args: Any, progress: Progress) -> Any:
-        """One of the methods below, by its name."""
+    def call(self, name: str, *args: Any, progress: Progress) -> Any:
+        """Call one of the methods below by its name."""
         return getattr(self, name)(*args, progress=progress)
 
-    def share(self, objects: Iterable[LoadedObject]) -> None:
-        """Know the clouds of these objects, by their files, and forget all others."""
-        self.know({loaded.file: loaded.cloud for loaded in objects})
+    def use_objects(self, objects: Iterable[LoadedObject]) -> None:
+        """Take the clouds of these objects, and forget all others."""
+        self.use_clouds({loaded.file: loaded.cloud for loaded in objects})
 
-    def know(self, clouds: Mapping[str, PointCloud | None]) -> None:
-        """Know these clouds, by their files; None stands for one that is known already."""
+    def use_clouds(self, clouds: Mapping[str, PointCloud | None]) -> None:
+        """Take these clouds, by file; None stands for one that was taken before."""
         self._clouds = {f: self._clouds[f] if c is None else c for f, c in clouds.items()}
         self._paintables = {
             f: paintable for f, paintable in self._paintables.items() if f in clouds
         }
-        self._embedded = {k: kept for k, kept in self._embedded.items() if k[1] in clouds}
-        self._said = {k: said for k, said in self._said.items() if {k[1], k[2]} <= set(clouds)}
+        self._encoded = {k: kept for k, kept in self._encoded.items() if k[1] in clouds}
+        self._features = {
+            k: kept for k, kept in self._features.items() if {k[1], k[2]} <= set(clouds)
+        }
 
     def end(self) -> None:
-        """Nothing is to be ended."""
+        """Does nothing: there is no process to end."""
 
     def read(
         self, name: str, content: bytes, category: str, unit: str | None, progress: Progress
@@ -124,7 +128,7 @@ class LocalComputing:
         return read_upload(name, content, category, unit)
 
     def plan(self, reference: str, region: PaintedRegion, number: int, progress: Progress) -> Plan:
-        """A step of a region, planned on the reference."""
+        """Plan a process step of a region on the reference."""
         progress(0, 1)
         try:
             process = process_of(region, number)
@@ -135,45 +139,48 @@ class LocalComputing:
         checked = check_process(paintable.surface, region.name, indices, process, paintable.given)
         return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
 
-    def teach(self, lesson: int, clouds: Path, document: Document, progress: Progress) -> None:
-        """Get ready to bring a document's processes to targets. lesson: its number, which differs
-        for what teaches something else; clouds: the folder of their files.
+    def prepare(self, revision: int, clouds: Path, document: Document, progress: Progress) -> None:
+        """Prepare to transfer a document's processes to targets.
+
+        revision: a number that differs for different processes; clouds: the folder of the clouds.
 
         Raises NrdfError for a document that is not complete, naming region, field and value.
         """
         progress(0, 1)
-        if self._teacher is None or self._teacher[0] != lesson:
+        if self._transfer_process is None or self._transfer_process[0] != revision:
             model = self._model(document.category)
-            self._teacher = lesson, ProcessTransfer(bound_knowledge_of(clouds, document), model)
+            bound_knowledge = bound_knowledge_of(clouds, document)
+            self._transfer_process = revision, ProcessTransfer(bound_knowledge, model)
 
     def transfer(
         self, target: str, marked: Mapping[str, np.ndarray], progress: Progress
     ) -> TransferResult:
-        """Bring what was taught last to the object of a file; marked: regions painted on it."""
+        """Transfer the prepared processes to a target; marked: regions painted on it by hand."""
         progress(0, 1)
-        teacher = self._taught
-        return teacher.transfer(self._seen(target), marked=dict(marked), progress=progress)
+        target_cloud = self._encode(target)
+        return self._prepared.transfer(target_cloud, marked=dict(marked), progress=progress)
 
-    def describe(
+    def correspondence_features(
         self, reference: str, files: Mapping[str, str], progress: Progress
     ) -> CorrespondenceFeatures:
-        """What the descriptors of objects, by key and file, say of what was taught last."""
-        taught = self._taught.reference
-        said = {}
+        """Correspondence features of objects, by key and file, with the prepared reference."""
+        encoded = self._prepared.reference
+        features = {}
         for done, (key, file) in enumerate(files.items()):
             progress(done, len(files))
-            place = (self._taught.model.category, reference, file)
-            if place not in self._said:
-                seen = taught.reference if file == reference else self._seen(file)
-                self._said[place] = taught.correspondence_features(seen)
-            said[key] = self._said[place]
-        own = oriented_features(taught.reference.points, taught.reference.normals, NORMAL_WEIGHT)
-        return CorrespondenceFeatures(said, own, taught.reference.nearest_working)
+            kept = (self._prepared.model.category, reference, file)
+            if kept not in self._features:
+                cloud = encoded.reference if file == reference else self._encode(file)
+                self._features[kept] = encoded.correspondence_features(cloud)
+            features[key] = self._features[kept]
+        cloud = encoded.reference
+        own = oriented_features(cloud.points, cloud.normals, NORMAL_WEIGHT)
+        return CorrespondenceFeatures(features, own, cloud.nearest_working)
 
     @property
-    def _taught(self) -> ProcessTransfer:
-        assert self._teacher is not None, "`teach` comes first"
-        return self._teacher[1]
+    def _prepared(self) -> ProcessTransfer:
+        assert self._transfer_process is not None, "`prepare` comes first"
+        return self._transfer_process[1]
 
     def _model(self, category: str) -> Model:
         if category not in self._models:
@@ -185,18 +192,17 @@ class LocalComputing:
             self._paintables[file] = PaintableCloud(self._clouds[file])
         return self._paintables[file]
 
-    def _seen(self, file: str) -> EncodedCloud:
-        model = self._taught.model
-        if (model.category, file) not in self._embedded:
-            self._embedded[model.category, file] = model.encode(self._clouds[file])
-        return self._embedded[model.category, file]
+    def _encode(self, file: str) -> EncodedCloud:
+        model = self._prepared.model
+        if (model.category, file) not in self._encoded:
+            self._encoded[model.category, file] = model.encode(self._clouds[file])
+        return self._encoded[model.category, file]
 
 
 class ChildProcessComputing:
-    """The same, in a process of its own, which is started when it is needed, and again when it has
-    ended; clouds go there once.
+    """The same in a child process, which is started when it is needed, and again when it has ended.
 
-    load: can be sent to a process: a function of a module, or `functools.partial` of one.
+    Each cloud is sent once. load: can be pickled: a function of a module, or `functools.partial`.
     """
 
     def __init__(self, load: Callable[[str], Model]) -> None:
@@ -205,20 +211,20 @@ class ChildProcessComputing:
         self._wanted: dict[str, PointCloud] = {}
         self._known: set[str] = set()
 
-    def share(self, objects: Iterable[LoadedObject]) -> None:
+    def use_objects(self, objects: Iterable[LoadedObject]) -> None:
         """As of `LocalComputing`."""
         self._wanted = {loaded.file: loaded.cloud for loaded in objects}
 
-    def ask(self, name: str, *args: Any, progress: Progress) -> Any:
+    def call(self, name: str, *args: Any, progress: Progress) -> Any:
         """As of `LocalComputing`. Raises ComputingProcessEnded if the process ends before it
         answers."""
         if self._child is None or not self._child.alive:
             self.end()
-            self._child = ChildProcess(_serve, (self._load,), _gone)
+            self._child = ChildProcess(_serve, (self._load,), _ended_error)
         sent = {f: None if f in self._known else c for f, c in self._wanted.items()}
         self._known = set(sent)
         try:
-            return self._child.ask((sent, name, args), progress)
+            return self._child.request((sent, name, args), progress)
         except ComputingProcessEnded:
             self.end()
             raise
@@ -232,31 +238,31 @@ class ChildProcessComputing:
 
 
 def without_clouds(document: Document) -> Document:
-    """The document as it is sent: objects are known by their files."""
+    """The document without its clouds, to be sent: objects are named by their files."""
 
-    def bare(loaded: LoadedObject) -> LoadedObject:
+    def without_cloud(loaded: LoadedObject) -> LoadedObject:
         return replace(loaded, cloud=_NOT_SENT)
 
-    reference = None if document.reference is None else bare(document.reference)
-    targets = tuple(replace(t, object=bare(t.object)) for t in document.targets)
+    reference = None if document.reference is None else without_cloud(document.reference)
+    targets = tuple(replace(t, object=without_cloud(t.object)) for t in document.targets)
     return replace(document, reference=reference, targets=targets)
 
 
-def _gone(why: str) -> ComputingProcessEnded:
+def _ended_error(why: str) -> ComputingProcessEnded:
     return ComputingProcessEnded(
-        f"the process that computes has ended by itself ({why}), by a fault of native code or for "
-        "lack of memory. What you made is kept. It is started again with the next thing that you "
-        "do; if it ends again, take away the object or region that it worked on"
+        f"the process that computes has ended by itself ({why}), by a crash of native code or for "
+        "lack of memory. Your session is kept. It is started again with the next thing that you "
+        "do; if it ends again, remove the object or region that it worked on"
     )
 
 
 def _serve(pipe: Connection, load: Callable[[str], Model]) -> None:
-    """In the process: what is asked for, until the other side is gone."""
+    """In the child process: answer calls until the studio has ended."""
     computing = LocalComputing(load)
     while True:
-        order = pipe.recv()
-        if order is not None:  # else given up when it was answered already
-            clouds, name, args = order
-            computing.know(clouds)
-            ask = partial(computing.ask, name, *args, progress=progress_of(pipe))
-            answer(pipe, ask)
+        request = pipe.recv()
+        if request is not None:  # else cancelled after it was answered
+            clouds, name, args = request
+            computing.use_clouds(clouds)
+            call = partial(computing.call, name, *args, progress=progress_of(pipe))
+            answer(pipe, call)

@@ -1,7 +1,7 @@
-"""What a person has made in the studio.
+"""The content of a session.
 
-A `Document` is never changed, only replaced, so that undoing is going back to an earlier one, and
-work in the background can look at one while the next is made.
+A `Document` is never changed, only replaced, so that undo goes back to an earlier one, and work in
+the background can use one while the next is made.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class PaintedRegion:
 
 @dataclass(frozen=True)
 class LoadedObject:
-    """An object: what people call it, its cloud in metres, and its file in the session's folder."""
+    """An object: its name, its cloud in metres, and its file in the session's folder."""
 
     name: str
     cloud: PointCloud
@@ -40,8 +40,10 @@ class LoadedObject:
 
 @dataclass(frozen=True)
 class Target:
-    """An object that the process is brought to. corrected: regions painted by hand on it, name to
-    mask (m,) bool, in place of those that are found."""
+    """An object that the process is transferred to.
+
+    corrected: regions painted on it by hand, name to mask (m,) bool, in place of found ones.
+    """
 
     object: LoadedObject
     corrected: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -49,7 +51,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Document:
-    """Everything of a session that a person has made."""
+    """Reference, regions with their processes, and targets."""
 
     category: str = "chair"
     reference: LoadedObject | None = None

@@ -1,4 +1,4 @@
-"""What a person can do with a session, whatever shows it: load, paint, describe, correct."""
+"""Every change of a session: load objects, paint regions, describe processes, correct."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FIRST_KIND = "sand"
 
 
 class Editor:
-    """A session, its objects ready to be painted on, and every change that can be made to it.
+    """A session, its objects as paintable clouds, and every change that can be made.
 
     Raises what `Session` raises.
     """
@@ -37,7 +37,7 @@ class Editor:
 
     @property
     def document(self) -> Document:
-        """What has been made so far."""
+        """The session's content."""
         return self.session.document
 
     def paintable(self, key: str) -> PaintableCloud:
@@ -49,7 +49,7 @@ class Editor:
         return kept[1]
 
     def object_keys(self) -> list[str]:
-        """The objects that there are."""
+        """The keys of the reference, if there is one, and of the targets."""
         document = self.document
         first = [] if document.reference is None else [REFERENCE]
         return first + [target.object.name for target in document.targets]
@@ -61,34 +61,34 @@ class Editor:
     # --- objects
 
     def open_reference(self, name: str, cloud: PointCloud, category: str) -> None:
-        """Begin with a reference, in metres; regions and targets of an earlier one go."""
+        """Begin with a reference, in metres; earlier regions and targets are removed."""
         loaded = self.session.store(shown_name(name), thinned_reference(cloud))
         self.session.change(Document(category, loaded))
 
-    def open_knowledge(self, name: str, lesson: BoundKnowledge) -> None:
-        """Begin with what a knowledge file teaches, on its reference."""
-        small = thinned_reference(lesson.cloud)
-        if len(small) < len(lesson.cloud):
+    def open_knowledge(self, name: str, bound_knowledge: BoundKnowledge) -> None:
+        """Begin with the content of a knowledge file, on its reference."""
+        small = thinned_reference(bound_knowledge.cloud)
+        if len(small) < len(bound_knowledge.cloud):
             raise RegionError(
-                f"the reference has {len(lesson.cloud)} points; knowledge with more than "
+                f"the reference has {len(bound_knowledge.cloud)} points; knowledge with more than "
                 f"{len(small)} is for the command line"
             )
-        loaded = self.session.store(shown_name(name), lesson.cloud)
+        loaded = self.session.store(shown_name(name), bound_knowledge.cloud)
         colours: dict[str, tuple[int, int, int]] = {}
-        for region in lesson.knowledge.regions:
+        for region in bound_knowledge.knowledge.regions:
             colours[region.name] = next_region_colour(list(colours.values()))
-        knowledge = lesson.knowledge
-        regions = painted_regions_of(lesson, colours)
+        knowledge = bound_knowledge.knowledge
+        regions = painted_regions_of(bound_knowledge, colours)
         self.session.change(
             Document(knowledge.category, loaded, regions, (), knowledge.allow_overlap)
         )
 
     def new_session(self) -> None:
-        """Put everything away; undoing brings it back."""
+        """Remove everything; undo brings it back."""
         self.session.change(Document(self.document.category))
 
     def add_target(self, name: str, cloud: PointCloud) -> str:
-        """Put an object, in metres, beside the others; the name that it got."""
+        """Add a target, in metres; its name."""
         taken = [REFERENCE, *(t.object.name for t in self.document.targets)]
         name = _free(safe_file_name(PurePath(shown_name(name)).stem, "target"), taken)
         target = Target(self.session.store(name, cloud))
@@ -97,14 +97,14 @@ class Editor:
         return name
 
     def remove_target(self, key: str) -> None:
-        """Take a target away."""
+        """Remove a target."""
         left = tuple(t for t in self.document.targets if t.object.name != key)
         self.session.change(replace(self.document, targets=left))
 
     # --- regions
 
     def add_region(self, name: str = "") -> str:
-        """A new region without points, with a process to begin with; its name."""
+        """Add a region without points, with one process step; its name."""
         document = self.document
         taken = [region.name for region in document.regions]
         name = _free(name or "region", taken, always=not name)
@@ -130,11 +130,11 @@ class Editor:
         self.session.change(document)
 
     def recolour_region(self, name: str, colour: tuple[int, int, int]) -> None:
-        """Another colour, red, green, blue, 0 to 255."""
+        """Set a region's colour: red, green, blue, 0 to 255."""
         self.session.change(self.document.with_region(name, colour=colour))
 
     def remove_region(self, name: str) -> None:
-        """Take a region, and what is done to it, away."""
+        """Remove a region and its processes."""
         document = self.document
         left = tuple(region for region in document.regions if region.name != name)
         document = replace(document, regions=left)
@@ -146,8 +146,10 @@ class Editor:
     # --- painting
 
     def mask(self, key: str, region: str, found: np.ndarray | None = None) -> np.ndarray:
-        """The shown points (k,) of an object that are in a region: as painted or corrected, or as
-        `found`, indices of a target's points."""
+        """Which shown points (k,) of an object are in a region.
+
+        As painted or corrected; else as `found`, the indices of a target's points.
+        """
         paintable, target = self.paintable(key), self.target(key)
         if target is None:
             painted = self.document.region(region)
@@ -160,7 +162,7 @@ class Editor:
         return paintable.to_shown(whole)
 
     def paint(self, key: str, region: str, mask: np.ndarray, merge: bool = False) -> None:
-        """Let a region be these shown points (k,): on the reference, or on a target by hand."""
+        """Set a region to these shown points (k,); on a target that is a correction."""
         paintable, target = self.paintable(key), self.target(key)
         whole = paintable.to_all(mask)
         if target is None:
@@ -170,22 +172,22 @@ class Editor:
         self.session.change(document, merge)
 
     def discard_corrections(self, key: str) -> None:
-        """Let a target's regions be what is found again."""
+        """Remove the regions painted by hand on a target."""
         self.session.change(self.document.with_target(key, corrected={}))
 
     def allow_overlap(self, allowed: bool) -> None:
-        """Whether regions may have points in common."""
+        """Set whether regions may have points in common."""
         self.session.change(replace(self.document, allow_overlap=allowed))
 
     def overlaps(self) -> list[str]:
-        """A line for each two regions that overlap by more than their borders."""
+        """A sentence for each two regions that overlap by more than their borders."""
         regions = {r.name: np.flatnonzero(r.mask) for r in self.document.regions if r.mask.any()}
         return overlaps(regions)
 
     # --- processes
 
     def change_step(self, region: str, number: int, **content: Any) -> None:
-        """Set fields of a step, SI; None takes a field away."""
+        """Set fields of a step, SI; None removes a field."""
         step = {**self._step(region, number), **content}
         self._set_step(region, number, {k: v for k, v in step.items() if v is not None})
 
@@ -194,18 +196,18 @@ class Editor:
         self._set_step(region, number, changed_step(self._step(region, number), shown))
 
     def restart_step(self, region: str, number: int, kind: str) -> None:
-        """Another kind of process, with the values that it begins with."""
+        """Set another kind of process, with its usual values."""
         self._set_step(region, number, new_step(kind))
 
     def add_step(self, region: str, kind: str) -> int:
-        """One more process on a region, after the others; its number."""
+        """Add a process step to a region, after the others; its number."""
         painted = self._painted(region)
         steps = (*painted.steps, new_step(kind))
         self.session.change(self.document.with_region(region, steps=steps))
         return len(steps) - 1
 
     def remove_step(self, region: str, number: int) -> None:
-        """Raises RegionError for the last one: a region needs a process."""
+        """Remove a process step. Raises RegionError for the only one: a region needs a process."""
         steps = self._painted(region).steps
         if len(steps) < 2:
             raise RegionError(f"region '{region}' needs at least one process; change this one")

@@ -1,4 +1,4 @@
-"""An object as it is shown and painted on: the points a model works with, and their surface."""
+"""An object as it is shown and painted on: a model's working points, and their surface."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from nrdf.surface.surface import Surface
 
 
 class PaintableCloud:
-    """An object to be shown and painted on.
+    """A cloud to be shown and painted on.
 
-    cloud: (n,) points, m. points, normals: (k, 3) of those that are shown, `shown` (k,) their
-    indices: what a model works with.
+    cloud: n points, m. points, normals: (k, 3) of the shown ones, which are a model's working
+    points; shown: (k,) their indices.
     """
 
     def __init__(self, cloud: PointCloud) -> None:
@@ -47,17 +47,19 @@ class PaintableCloud:
 
     @cached_property
     def given(self) -> GivenSurface:
-        """The object as it was given, to judge tool paths by."""
-        normals = self.normals[self._follows] if self.cloud.normals is None else self.cloud.normals
+        """The object as it was given, to measure tool paths against."""
+        normals = (
+            self.normals[self._nearest_shown] if self.cloud.normals is None else self.cloud.normals
+        )
         return given_surface(replace(self.cloud, normals=normals))
 
     @cached_property
-    def _follows(self) -> np.ndarray:
+    def _nearest_shown(self) -> np.ndarray:
         return np.asarray(cKDTree(self.points).query(self.cloud.points)[1])
 
     def to_all(self, mask: np.ndarray) -> np.ndarray:
-        """A mask of the shown points (k,) as one of all points (n,): each follows its nearest."""
-        return mask if len(self.shown) == len(self.cloud) else mask[self._follows]
+        """A mask of the shown points (k,) as one of all points (n,), by the nearest shown point."""
+        return mask if len(self.shown) == len(self.cloud) else mask[self._nearest_shown]
 
     def to_shown(self, values: np.ndarray) -> np.ndarray:
         """Values of all points (n, ...) as those of the shown ones (k, ...)."""

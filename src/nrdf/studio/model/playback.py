@@ -1,4 +1,4 @@
-"""A simulated job as it can be shown: shapes, and where they are at every moment."""
+"""A simulated job as it is played back: shapes, and their poses at every moment."""
 
 from __future__ import annotations
 
@@ -50,9 +50,8 @@ class Playback:
     times: (t,), s. At each: path (t,), the number of the tool path; motion (t,), a
     `nrdf.robot.planning.program.ActionKind`; line (t,), -1 between lines; force_n (t,);
     turntable_rad (t,); positions (t, b, 3) and quaternions_wxyz (t, b, 4) of the bodies.
-    T_cell_object: (4, 4),
-    of the object at turntable angle 0. unreached: (k, 3), waypoints that are not reached, in the
-    object's frame, m. report: the content of report.json.
+    T_cell_object: (4, 4), of the object at turntable angle 0. unreached: (k, 3), waypoints that are
+    not reached, in the object's frame, m. report: the content of report.json.
     """
 
     shapes: tuple[Shape, ...]
@@ -79,42 +78,42 @@ class Playback:
 
 
 def playback_of(simulated: SimulationResult) -> Playback:
-    """A simulation as it can be shown."""
+    """A simulation as it is played back."""
     shapes: list[Shape] = _standing(simulated)
     parts: dict[str, list[np.ndarray]] = defaultdict(list)
-    clock, turn = 0.0, None
-    for number, driven in enumerate(simulated.paths):
-        model = cell_specification(driven.cell).compile()
+    clock, last_rad = 0.0, None
+    for number, path in enumerate(simulated.paths):
+        model = cell_specification(path.cell).compile()
         made = _shapes(model, number)
         shapes += [shape for shape in made if number == 0 or shape.path == number]
-        mover = _Mover(model, driven, simulated.placement.T_cell_base())
-        for log in driven.logs:
+        mover = _Mover(model, path, simulated.placement.T_cell_base())
+        for log in path.logs:
             kept = written_steps(log)
             count = len(kept)
             positions, quaternions = mover(log.joints[kept])
-            angle = driven.cell.turntable_rad[log.action.turntable_index]
-            turn = angle if turn is None else turn
-            step = (angle - turn + np.pi) % (2 * np.pi) - np.pi
-            line = driven.line(log)
+            angle = path.cell.turntable_rad[log.action.turntable_index]
+            last_rad = angle if last_rad is None else last_rad
+            step = (angle - last_rad + np.pi) % (2 * np.pi) - np.pi
+            line = path.line(log)
             added = {
                 "times": clock + kept * STEP_S,
                 "path": np.full(count, number),
                 "motion": np.full(count, log.action.kind),
                 "line": np.full(count, line),
                 "force_n": log.force_n[kept],
-                "turntable_rad": turn + step * np.linspace(1 / count, 1, count),
+                "turntable_rad": last_rad + step * np.linspace(1 / count, 1, count),
                 "positions": positions.astype(np.float32),
                 "quaternions_wxyz": quaternions.astype(np.float32),
             }
             for name, values in added.items():
                 parts[name].append(values)
             clock += len(log.joints) * STEP_S
-            turn = angle
+            last_rad = angle
     return Playback(
         tuple(shapes),
         **{name: np.concatenate(values) for name, values in parts.items()},
         T_cell_object=_upright(simulated),
-        unreached=np.concatenate([_unreached(driven) for driven in simulated.paths]),
+        unreached=np.concatenate([_unreached(path) for path in simulated.paths]),
         report=simulation_report(simulated),
     )
 
@@ -122,24 +121,25 @@ def playback_of(simulated: SimulationResult) -> Playback:
 class _Mover:
     """The bodies' poses in the cell's frame at given joints."""
 
-    def __init__(self, model: Any, driven: SimulatedPath, T_cell_base: np.ndarray) -> None:
+    def __init__(self, model: Any, path: SimulatedPath, T_cell_base: np.ndarray) -> None:
         self._model, self._data = model, mujoco.MjData(model)
-        names = driven.cell.arm.joint_names
+        names = path.cell.arm.joint_names
         self._joints = model.jnt_qposadr[[model.joint(name).id for name in names]]
-        self._place = T_cell_base[:3, 3]
-        self._turn = T_cell_base[:3, :3]
+        self._translation = T_cell_base[:3, 3]
+        self._rotation = T_cell_base[:3, :3]
 
     def __call__(self, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (t, b, 3) and quaternions, scalar first, (t, b, 4) at joints (t, n)."""
-        places = np.zeros((len(joints), self._model.nbody - 1, 3))
+        positions = np.zeros((len(joints), self._model.nbody - 1, 3))
         matrices = np.zeros((len(joints), self._model.nbody - 1, 9))
         for k, values in enumerate(joints):
             self._data.qpos[self._joints] = values
             mujoco.mj_kinematics(self._model, self._data)
-            places[k], matrices[k] = self._data.xpos[1:], self._data.xmat[1:]
-        turned = self._turn @ matrices.reshape(-1, 3, 3)
+            positions[k], matrices[k] = self._data.xpos[1:], self._data.xmat[1:]
+        turned = self._rotation @ matrices.reshape(-1, 3, 3)
         quaternions = quaternions_wxyz(turned)
-        return places @ self._turn.T + self._place, quaternions.reshape(*places.shape[:2], 4)
+        positions = positions @ self._rotation.T + self._translation
+        return positions, quaternions.reshape(*positions.shape[:2], 4)
 
 
 def _shapes(model: Any, path: int) -> list[Shape]:
@@ -150,8 +150,8 @@ def _shapes(model: Any, path: int) -> list[Shape]:
         mesh = _mesh(model, int(geom))
         if mesh is None:
             continue
-        turn = Rotation.from_quat(np.roll(model.geom_quat[geom], -1)).as_matrix()
-        vertices = mesh.vertices @ turn.T + model.geom_pos[geom]
+        rotation = Rotation.from_quat(np.roll(model.geom_quat[geom], -1)).as_matrix()
+        vertices = mesh.vertices @ rotation.T + model.geom_pos[geom]
         material = int(model.geom_matid[geom])
         colour = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
         tool = model.geom(geom).name.startswith(_OF_TOOL)
@@ -219,14 +219,14 @@ def _upright(simulated: SimulationResult) -> np.ndarray:
     return np.asarray(back @ poses[0])
 
 
-def _unreached(driven: SimulatedPath) -> np.ndarray:
+def _unreached(path: SimulatedPath) -> np.ndarray:
     """Waypoints (k, 3) that are not reached, on the surface."""
-    height = driven.strategy.standoff_m
-    places = [
+    height = path.strategy.standoff_m
+    positions = [
         (group.process.positions + height * group.process.axes)[verdict != "reached"]
-        for group, verdict in zip(driven.path.groups, driven.metrics.verdicts, strict=True)
+        for group, verdict in zip(path.path.groups, path.metrics.verdicts, strict=True)
     ]
-    return np.concatenate([np.zeros((0, 3)), *places])
+    return np.concatenate([np.zeros((0, 3)), *positions])
 
 
 def _rgb(colour: np.ndarray) -> tuple[int, int, int]:

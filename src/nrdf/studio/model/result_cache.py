@@ -1,4 +1,4 @@
-"""What is computed of a session: plans on the reference, and what arrives on the targets."""
+"""What is computed of a session: plans on the reference, and transfer results on the targets."""
 
 from __future__ import annotations
 
@@ -25,29 +25,29 @@ from nrdf.studio.model.worker import Progress
 
 @dataclass(frozen=True)
 class TargetResult:
-    """What arrived on a target, and of which lesson, by its number."""
+    """A target's transfer result. revision: the number of the processes that were transferred."""
 
     transfer_result: TransferResult
-    lesson: int
+    revision: int
     target: Target
 
     @property
     def uncertain_regions(self) -> list[str]:
-        """Regions that a person should look at: skipped, or found with little confidence."""
+        """Regions that a person should check: not found, or found with low confidence."""
         regions = self.transfer_result.regions.values()
         return [r.name for r in regions if r.missing or r.match.score < LOW_CONFIDENCE]
 
 
 class ResultCache:
-    """Plans and transfers of a editor's document, each kept as long as it holds."""
+    """Plans and transfer results of a document, each kept as long as it is current."""
 
     def __init__(self, editor: Editor, computing: LocalComputing | ChildProcessComputing) -> None:
         self.editor = editor
         self.by_target: dict[str, TargetResult] = {}
         self._computing = computing
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
-        self._lesson: tuple[Document, int] | None = None
-        self._lessons = 0
+        self._revision: tuple[Document, int] | None = None
+        self._revisions = 0
 
     def stop(self) -> None:
         """End what computes."""
@@ -57,7 +57,7 @@ class ResultCache:
         self, name: str, content: bytes, category: str, unit: str | None, progress: Progress
     ) -> PointCloud:
         """The cloud, in metres, of a file that a browser sent, as of `read_upload`."""
-        cloud: PointCloud = self._computing.ask(
+        cloud: PointCloud = self._computing.call(
             "read", name, content, category, unit, progress=progress
         )
         return cloud
@@ -65,18 +65,18 @@ class ResultCache:
     # --- plans on the reference
 
     def plan(self, region: PaintedRegion, number: int) -> Plan | None:
-        """A step's plan, None where it has not been made yet for what is painted and filled in."""
+        """A process step's plan, None where the current region and step are not planned yet."""
         kept = self._plans.get((region.name, number))
-        basis = _basis(self.editor.document, region, number)
-        return kept[1] if kept is not None and kept[0] == basis else None
+        plan_key = _plan_key(self.editor.document, region, number)
+        return kept[1] if kept is not None and kept[0] == plan_key else None
 
-    def planned(self, region: PaintedRegion) -> list[np.ndarray]:
-        """The lines (m, 3) of a region's steps that are planned."""
+    def planned_lines(self, region: PaintedRegion) -> list[np.ndarray]:
+        """The lines, each (m, 3), of a region's steps that are planned."""
         plans = [self.plan(region, number) for number in range(len(region.steps))]
         return [line for plan in plans if plan is not None for line in plan.lines]
 
     def make_plans(self, document: Document, progress: Progress) -> None:
-        """Plan every step that is not planned yet, those of regions with points."""
+        """Plan every step that is not planned yet, of regions that have points."""
         waiting = [
             (region, number)
             for region in document.regions if region.mask.any()
@@ -86,30 +86,30 @@ class ResultCache:
             progress(done, len(waiting))
             if self.editor.document.reference is not document.reference:
                 return
-            basis = _basis(document, region, number)
-            self._computing.share(_objects(document))
+            plan_key = _plan_key(document, region, number)
+            self._computing.use_objects(_objects(document))
             assert document.reference is not None  # regions are on one
-            made = self._computing.ask(
+            made = self._computing.call(
                 "plan", document.reference.file, region, number,
                 progress=_within(progress, done, len(waiting)),
             )  # fmt: skip
-            self._plans[region.name, number] = basis, made
+            self._plans[region.name, number] = plan_key, made
 
     # --- targets
 
     def is_current(self, key: str) -> bool:
-        """Whether a target's result is that of what is painted and filled in now."""
+        """Whether a target's result is of the current regions and processes."""
         result = self.by_target.get(key)
         return (
             result is not None
             and result.target is self.editor.target(key)
-            and self._lesson is not None
-            and result.lesson == self._lesson[1]
-            and _same_lesson(self._lesson[0], self.editor.document)
+            and self._revision is not None
+            and result.revision == self._revision[1]
+            and _same_processes(self._revision[0], self.editor.document)
         )
 
     def ready(self, key: str) -> TargetResult:
-        """A target's result. Raises ProcessError where there is none of what is painted now."""
+        """A target's current result. Raises ProcessError where there is none."""
         result = self.by_target.get(key)
         if result is None:
             raise ProcessError("nothing is transferred to a target yet: do so in step 4")
@@ -121,60 +121,59 @@ class ResultCache:
         return result
 
     def transfer(self, document: Document, progress: Progress) -> None:
-        """Bring the processes to every target whose result is not current.
+        """Transfer the processes to every target whose result is not current.
 
         Raises NrdfError for a document that is not complete, naming region, field and value, and
         what `ProcessTransfer.transfer` raises, naming the target.
         """
-        lesson = self._taught(document, progress)
-        targets = [t for t in document.targets if not self._has(t, lesson)]
+        revision = self._prepare(document, progress)
+        targets = [t for t in document.targets if not self._is_of(t, revision)]
         for done, target in enumerate(targets):
-            self._transfer(target, lesson, _within(progress, done, len(targets)))
+            self._transfer(target, revision, _within(progress, done, len(targets)))
 
-    def _has(self, target: Target, lesson: int) -> bool:
+    def _is_of(self, target: Target, revision: int) -> bool:
         result = self.by_target.get(target.object.name)
-        return result is not None and result.lesson == lesson and result.target is target
+        return result is not None and result.revision == revision and result.target is target
 
-    def _taught(self, document: Document, progress: Progress) -> int:
-        """The number of what a document teaches, which is ready to be transferred then."""
-        if self._lesson is not None and _same_lesson(self._lesson[0], document):
-            number = self._lesson[1]
-        else:  # one that was never given: what was cancelled may have been taught all the same
-            self._lessons += 1
-            number = self._lessons
-        self._computing.share(_objects(document))
+    def _prepare(self, document: Document, progress: Progress) -> int:
+        """Prepare to transfer a document's processes; their revision."""
+        if self._revision is not None and _same_processes(self._revision[0], document):
+            number = self._revision[1]
+        else:  # a new number: a cancelled preparation may have been completed all the same
+            self._revisions += 1
+            number = self._revisions
+        self._computing.use_objects(_objects(document))
         clouds = self.editor.session.clouds
-        self._computing.ask("teach", number, clouds, without_clouds(document), progress=progress)
-        self._lesson = document, number
+        self._computing.call("prepare", number, clouds, without_clouds(document), progress=progress)
+        self._revision = document, number
         return number
 
-    def _transfer(self, target: Target, lesson: int, progress: Progress) -> None:
+    def _transfer(self, target: Target, revision: int, progress: Progress) -> None:
         name = target.object.name
         try:
-            transfer_result = self._computing.ask(
+            transfer_result = self._computing.call(
                 "transfer", target.object.file, dict(target.corrected), progress=progress
             )
         except NrdfError as error:
             raise type(error)(f"target {name}: {error}") from None
-        self.by_target[name] = TargetResult(transfer_result, lesson, target)
+        self.by_target[name] = TargetResult(transfer_result, revision, target)
 
     # --- similarity
 
     def correspondence_features(
         self, document: Document, progress: Progress
     ) -> CorrespondenceFeatures:
-        """What the descriptors of the reference and of every target with a result say, computed
-        where it has changed."""
-        self._taught(document, progress)
-        assert document.reference is not None  # else nothing is taught
+        """Features of the reference and of every target with a result; unchanged ones are kept."""
+        self._prepare(document, progress)
+        assert document.reference is not None  # else nothing is prepared
         files = {REFERENCE: document.reference.file}
         files |= {key: r.target.object.file for key, r in self.by_target.items()}
         results = [result.target.object for result in self.by_target.values()]
-        self._computing.share([*_objects(document), *results])
-        described: CorrespondenceFeatures = self._computing.ask(
-            "describe", document.reference.file, files, progress=progress
+        self._computing.use_objects([*_objects(document), *results])
+        features: CorrespondenceFeatures = self._computing.call(
+            "correspondence_features", document.reference.file, files, progress=progress
         )
-        return described
+        return features
 
 
 def _objects(document: Document) -> list[LoadedObject]:
@@ -182,23 +181,23 @@ def _objects(document: Document) -> list[LoadedObject]:
     return [*first, *(target.object for target in document.targets)]
 
 
-def _basis(document: Document, region: PaintedRegion, number: int) -> bytes:
-    """What a plan depends on."""
+def _plan_key(document: Document, region: PaintedRegion, number: int) -> bytes:
+    """Identifies everything that a plan depends on."""
     reference = "" if document.reference is None else document.reference.file
-    said = json.dumps([reference, region.name, dict(region.steps[number])], sort_keys=True)
-    return said.encode() + np.packbits(region.mask).tobytes()
+    text = json.dumps([reference, region.name, dict(region.steps[number])], sort_keys=True)
+    return text.encode() + np.packbits(region.mask).tobytes()
 
 
-def _same_lesson(one: Document, other: Document) -> bool:
-    """Whether two documents teach the same; colours do not count."""
+def _same_processes(one: Document, other: Document) -> bool:
+    """Whether two documents have the same regions and processes; colours do not count."""
 
-    def taught(document: Document) -> tuple[object, ...]:
+    def content(document: Document) -> tuple[object, ...]:
         regions = tuple((r.name, id(r.mask), id(r.steps)) for r in document.regions)
         return (document.category, document.allow_overlap, id(document.reference), regions)
 
-    return taught(one) == taught(other)
+    return content(one) == content(other)
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:
-    """Progress of one part of several, in hundredths of all."""
+    """Progress of one part of several, in per cent of a part."""
     return lambda done, total: progress(int(100 * (number + done / total)), 100 * count)

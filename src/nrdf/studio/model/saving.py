@@ -1,5 +1,4 @@
-"""What leaves the studio: knowledge, jobs, pictures, pages and robot programs, as the command line
-writes them."""
+"""What the studio saves: knowledge, jobs, pictures and robot programs, as the command line does."""
 
 from __future__ import annotations
 
@@ -36,30 +35,30 @@ def save_knowledge(editor: Editor) -> Path:
     """
     knowledge, document = knowledge_of(editor.session.clouds, editor.document), editor.document
     assert document.reference is not None  # else there is no knowledge
-    place = saved_path(editor, "knowledge")
-    with output_folder(place, overwrite=True) as folder:
+    path = saved_path(editor, "knowledge")
+    with output_folder(path, overwrite=True) as folder:
         file = f"{knowledge.category}.yaml"
         write_knowledge(folder / file, knowledge, explained=True)
         shutil.copyfile(
             editor.session.path_of(document.reference), folder / document.reference.file
         )
-    return place
+    return path
 
 
 def save_job(editor: Editor, name: str, result: TargetResult, origin: Mapping[str, Any]) -> Path:
     """A target's job, as `nrdf transfer` writes it; its folder."""
-    place = saved_path(editor, name, "job")
-    with output_folder(place, overwrite=True) as folder:
+    path = saved_path(editor, name, "job")
+    with output_folder(path, overwrite=True) as folder:
         write_job_files(folder, result.transfer_result, Limits(), name, origin)
-    return place
+    return path
 
 
 def save_programs(editor: Editor, name: str, result: TargetResult, formats: Sequence[str]) -> Path:
     """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
-    place = saved_path(editor, name, "programs")
-    with output_folder(place, overwrite=True) as folder:
+    path = saved_path(editor, name, "programs")
+    with output_folder(path, overwrite=True) as folder:
         export_job(job_of(result.transfer_result), formats, folder)
-    return place
+    return path
 
 
 def save_picture(editor: Editor, results: ResultCache) -> Path:
@@ -67,7 +66,7 @@ def save_picture(editor: Editor, results: ResultCache) -> Path:
     document = editor.document
     if document.reference is None:
         raise ProcessError("there is nothing to draw: load a reference in step 1")
-    lines = {region.name: results.planned(region) for region in document.regions}
+    lines = {region.name: results.planned_lines(region) for region in document.regions}
     paintable = editor.paintable(REFERENCE)
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions}
     panels = [
@@ -79,10 +78,10 @@ def save_picture(editor: Editor, results: ResultCache) -> Path:
         result = results.by_target.get(target.object.name)
         if result is not None:
             panels.append(panel_of(result.transfer_result, target.object.name))
-    place = saved_path(editor, "picture.png")
-    with output_file(place):
-        draw_regions(panels, place)
-    return place
+    path = saved_path(editor, "picture.png")
+    with output_file(path):
+        draw_regions(panels, path)
+    return path
 
 
 def zipped(folder: Path) -> bytes:
@@ -96,6 +95,6 @@ def zipped(folder: Path) -> bytes:
 
 
 def saved_path(editor: Editor, *parts: str) -> Path:
-    """Where something is saved; `parts`: the target's name, if it is of one, and what it is."""
-    # A session's file may have been written by somebody else, with any names.
+    """Where something is saved. parts: the target's name, if it is of one, and what it is."""
+    # The session's file may come from somebody else, with any names.
     return editor.session.folder.joinpath(SAVED, *(safe_file_name(p, "target") for p in parts))

@@ -1,4 +1,4 @@
-"""What a person has made so far: kept in a folder after every change, with undo and redo."""
+"""A session: a document kept in a folder after every change, with undo and redo."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _MOST_UNDONE = 200
 class Session:
     """A document in a folder, with its history. Every change is on disk when `change` returns.
 
-    A session that is damaged is put aside whole, in a folder beside the new one; `damage` says how
-    and where, and is "" else. Raises OutputError where the folder cannot be read or written, and
+    A damaged session is moved whole into a folder beside the new one; `damage` says why and where
+    to, and is "" otherwise. Raises OutputError where the folder cannot be read or written, and
     NewerSession for a session of a newer version.
     """
 
@@ -73,7 +73,7 @@ class Session:
         return self._go(self._done, self._undone)
 
     def redo(self) -> bool:
-        """Take the last undoing back; whether there was one."""
+        """Make the change again that was undone last; whether there was one."""
         return self._go(self._undone, self._done)
 
     def store(self, name: str, cloud: PointCloud) -> LoadedObject:

@@ -1,6 +1,6 @@
-"""The file of a session, and the clouds beside it: written whole, and read with suspicion.
+"""The file of a session and the clouds beside it: written whole, and checked when read.
 
-The file is a person's: it may have been edited, cut off, or made up by somebody else.
+It may have been edited, cut off, or written by somebody else.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class _Shown(BaseModel):
-    """What the page shows of something that need not be right yet; the rest is kept as it is."""
+    """The part of something unfinished that the page shows; the rest is kept as it is."""
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 

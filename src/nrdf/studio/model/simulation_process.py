@@ -1,5 +1,4 @@
-"""A simulation in a process of its own, which keeps what it has simulated, to draw and write it
-when asked."""
+"""A simulation in a child process, which keeps the result, to draw and write it on request."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def require_mujoco() -> None:
-    """Raises RobotError, with the line that installs it, where there is no MuJoCo."""
+    """Raises RobotError, which says what to install, where MuJoCo is missing."""
     if find_spec("mujoco") is None:
         raise RobotError(
             "simulating needs MuJoCo, which is not installed: pip install 'nrdf[robot]' (Python "
@@ -30,10 +29,10 @@ class SimulationProcess:
     """A process that simulates one job on an arm: the bundled one, or that of a file."""
 
     def __init__(self, job: Path, robot: Path | None = None, tool_frame: str | None = None) -> None:
-        self._child = ChildProcess(_serve, (job, robot, tool_frame), _gone)
+        self._child = ChildProcess(_serve, (job, robot, tool_frame), _ended_error)
 
     def run(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
-        """Wait for the simulation; `say` is told what is being done. Raises RobotError and
+        """Wait for the simulation; `say` gets the phases of the work. Raises RobotError and
         ProcessError as `nrdf simulate` does, and what `progress` raises."""
         made: Playback = self._child.wait(progress, say)
         return made
@@ -41,17 +40,18 @@ class SimulationProcess:
     def write(
         self, folder: Path, title: str, origin: Mapping[str, Any], progress: Progress
     ) -> dict[str, Any]:
-        """Write what `nrdf simulate` writes into a folder that appears whole or not at all; what
-        its report.json says. Raises OutputError, and what `progress` raises."""
-        made: dict[str, Any] = self._child.ask((folder, title, dict(origin)), progress)
+        """Write what `nrdf simulate` writes, whole or not at all; the content of its report.json.
+
+        Raises OutputError, and what `progress` raises."""
+        made: dict[str, Any] = self._child.request((folder, title, dict(origin)), progress)
         return made
 
     def end(self) -> None:
-        """End the process; what it has written half is removed. Who waits for it is cancelled."""
+        """End the process; half-written files are removed. Who waits for it gets Cancelled."""
         self._child.end()
 
 
-def _gone(why: str) -> RobotError:
+def _ended_error(why: str) -> RobotError:
     return RobotError(
         f"the simulation's process has ended by itself ({why}), perhaps for lack of memory: "
         "simulate again, or use `nrdf simulate`"
@@ -59,13 +59,13 @@ def _gone(why: str) -> RobotError:
 
 
 def _serve(pipe: Connection, job: Path, robot: Path | None, tool_frame: str | None) -> None:
-    """In the process: simulate, then write whenever asked, until the other side is gone."""
+    """In the child process: simulate, then write on request until the studio has ended."""
     simulated: list[Any] = []
     answer(pipe, lambda: _simulate(pipe, job, robot, tool_frame, simulated))
     while simulated:
-        order = pipe.recv()
-        if order is not None:  # else cancelled when it was written already
-            answer(pipe, lambda order=order: _write(pipe, simulated[0], *order))  # type: ignore[misc]
+        request = pipe.recv()
+        if request is not None:  # else cancelled after it was written
+            answer(pipe, lambda request=request: _write(pipe, simulated[0], *request))  # type: ignore[misc]
 
 
 def _simulate(

@@ -1,4 +1,4 @@
-"""From what was painted and filled in to process knowledge, by the knowledge file's own rules."""
+"""From a document to process knowledge, by the rules of the knowledge file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def new_step(kind: str) -> dict[str, Any]:
 
 
 def plain_step(process: Process) -> dict[str, Any]:
-    """A process as a knowledge file holds it, SI, its stepover given as such."""
+    """A process as a knowledge file holds it, in SI, with the stepover in place of the overlap."""
     content = process.model_dump(mode="json", exclude_defaults=True)
     if process.trajectory != "taught":
         content.pop("overlap", None)
@@ -90,8 +90,11 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
 
 
 def bound_knowledge_of(clouds: Path, document: Document) -> BoundKnowledge:
-    """The document as knowledge on its reference. Raises ProcessError for regions that overlap, and
-    as `knowledge_of` and `nrdf.process.bound_knowledge.resolve` do."""
+    """The document as knowledge bound to its reference.
+
+    Raises ProcessError for regions that overlap, and what `knowledge_of` and
+    `nrdf.process.bound_knowledge.resolve` raise.
+    """
     regions = {r.name: np.flatnonzero(r.mask) for r in document.regions if r.mask.any()}
     for line in [] if document.allow_overlap else overlaps(regions):
         raise ProcessError(
@@ -119,13 +122,13 @@ def _content(
 
 
 def painted_regions_of(
-    lesson: BoundKnowledge, colours: Mapping[str, tuple[int, int, int]]
+    bound_knowledge: BoundKnowledge, colours: Mapping[str, tuple[int, int, int]]
 ) -> tuple[PaintedRegion, ...]:
-    """A lesson's regions and steps, to be changed on the page."""
+    """The regions and process steps of knowledge, to be changed on the page."""
     painted = []
-    for region in lesson.knowledge.regions:
-        mask = np.zeros(len(lesson.cloud), bool)
-        mask[lesson.regions[region.name]] = True
+    for region in bound_knowledge.knowledge.regions:
+        mask = np.zeros(len(bound_knowledge.cloud), bool)
+        mask[bound_knowledge.regions[region.name]] = True
         steps = tuple(plain_step(process) for process in region.processes)
         painted.append(PaintedRegion(region.name, colours[region.name], mask, steps))
     return tuple(painted)

@@ -26,7 +26,7 @@ _LONGEST_NAME = 60
 def read_upload(name: str, content: bytes, category: str, unit: str | None = None) -> PointCloud:
     """The cloud, in metres, of a file that a browser sent.
 
-    The name serves for messages, and its ending for telling the format; it is no path. unit: where
+    The name is for messages, and its ending for the format; it is not used as a path. unit: where
     the file does not say it. Raises CloudError for a file that is too large, of another type, or
     that `nrdf.io.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
     """
@@ -57,7 +57,7 @@ def check_upload(name: str, size: int) -> str:
 
 
 def too_large(shown: str, size: int) -> str:
-    """What is said of a file of that size, bytes, that is too large."""
+    """The message for a file of that size, bytes, which is too large."""
     return (
         f"{shown} has {size / 2**20:.0f} MiB; at most {LARGEST_UPLOAD >> 20} MiB are taken: thin "
         "it out, or use the command line, which has no limit"
@@ -70,7 +70,7 @@ def bundled(name: str) -> PointCloud:
 
 
 def thinned_reference(cloud: PointCloud) -> PointCloud:
-    """A reference as a model works with it: the same points that it would keep."""
+    """A reference reduced to the working points that a model would take."""
     if len(cloud) <= WORKING_POINTS:
         return cloud
     return cloud.select(downsample(cloud.points, WORKING_POINTS, np.random.default_rng(0)))

@@ -1,4 +1,4 @@
-"""Long work beside the page: one job at a time, the newest of a kind, and any can be cancelled."""
+"""Work in the background: one job at a time, only the newest of a kind; it can be cancelled."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Worker:
                     return
                 self._running, self._cancelled = self._waiting.pop(0), False
                 job = self._running
-                # What is replaced at once, as a slider's values are, is never begun.
+                # A job that is replaced at once, as by a slider, never begins.
                 replaced = self._changed.wait_for(lambda: self._cancelled, job.delay_s)
             error = "cancelled" if replaced else ""
             try:
@@ -111,7 +111,7 @@ class Worker:
                 error = str(problem)
             except Exception as problem:
                 log.exception("%s failed", job.what)
-                error = f"{type(problem).__name__}: {problem}; this is a fault of nrdf"
+                error = f"{type(problem).__name__}: {problem}; this is a bug of nrdf"
             with self._changed:
                 self._running = None
                 last = not self._waiting

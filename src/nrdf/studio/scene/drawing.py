@@ -66,7 +66,7 @@ def lines_of(
         return {name: (parts, colours[name]) for name, parts in drawn.items() if name in colours}
     lines: dict[str, tuple[Sequence[np.ndarray], np.ndarray]] = {}
     for region in editor.document.regions:
-        parts = results.planned(region)
+        parts = results.planned_lines(region)
         if parts:
             lines[region.name] = (parts, colours[region.name])
     return lines
