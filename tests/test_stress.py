@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import errno
-import json
 import os
 import sqlite3
 import subprocess
@@ -243,25 +242,10 @@ def test_a_picture_on_a_full_disk_is_an_output_error(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("nrdf.io.ply.os.replace", full)
+    monkeypatch.setattr("nrdf.io.atomic.os.replace", full)
     with pytest.raises(OutputError, match="No space left on device; free some space"):
         pictures._save(tmp_path / "x.png", np.zeros((8, 8, 3), np.uint8))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_report_is_whole_or_as_it_was(tmp_path, monkeypatch):
-    from nrdf.io.atomic import write_json
-
-    write_json(tmp_path / "x.json", {"a": 1})
-
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr("nrdf.io.ply.os.replace", full)
-    with pytest.raises(OutputError, match="No space"):
-        write_json(tmp_path / "x.json", {"a": 2})
-    assert json.loads((tmp_path / "x.json").read_text()) == {"a": 1}
-    assert [p.name for p in tmp_path.iterdir()] == ["x.json"]
 
 
 def test_regions_that_would_be_one_file_are_refused(tmp_path, capsys):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from builders.oriented_clouds import box, sphere
-from nrdf.geometry.visibility import seen_from_both_sides, visibility
+from nrdf.geometry.visibility import seen_from, seen_from_both_sides, visibility
 
 
 def test_visibility_tells_the_outer_side_and_finds_buried_points():
@@ -33,3 +33,22 @@ def test_both_sides_are_seen_of_an_open_surface_only():
     assert seen_from_both_sides(bowl[dish], lines[dish]).mean() > 0.8
     flask = bowl[:, 1] < 0.4  # a small hole changes nothing
     assert not seen_from_both_sides(bowl[flask], lines[flask]).any()
+
+
+def test_points_are_seen_from_the_side_that_they_face():
+    points, normals = box(np.random.default_rng(0), 4000, (1.0, 1.0, 1.0))
+    above, below = seen_from(points, normals, np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]))
+    inner = (np.abs(points[:, [0, 2]]) < 0.44).all(axis=1)  # the sides are in the edges' pixels
+    np.testing.assert_array_equal(above[inner], normals[inner, 1] > 0)
+    np.testing.assert_array_equal(below[inner], normals[inner, 1] < 0)
+
+
+def test_what_lies_before_a_point_hides_it():
+    points, normals = box(np.random.default_rng(0), 4000, (1.0, 0.1, 1.0))
+    lid = points * [0.5, 1.0, 0.5] + [0.0, 0.5, 0.0]
+    both, lines = np.concatenate([points, lid]), np.concatenate([normals, normals])
+    seen = seen_from(both, lines, np.array([[0.0, 1.0, 0.0]]))[0, : len(points)]
+    covered = (np.abs(points[:, [0, 2]]) < 0.22).all(axis=1) & (normals[:, 1] > 0)
+    free = (np.abs(points[:, [0, 2]]) > 0.28).any(axis=1) & (normals[:, 1] > 0)
+    assert not seen[covered].any()
+    assert seen[free].mean() > 0.88

@@ -10,7 +10,6 @@ import threading
 import pytest
 
 from nrdf.errors import OutputError
-from nrdf.io.atomic import output_errors
 from nrdf.io.locks import remove_partial_files, write_lock
 
 CLAIM = """
@@ -88,15 +87,3 @@ def test_a_name_that_no_file_can_have_is_an_error_in_words(tmp_path, name):
     with pytest.raises(OutputError, match="cannot write"), write_lock(f"{tmp_path}/{name}"):
         pytest.fail("the block must not run")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    "code, advice",
-    [(28, "free some space"), (30, "can only be read"), (13, "allow writing"), (36, "shorter")],
-)
-def test_the_message_says_what_to_do(code, advice):
-    with (
-        pytest.raises(OutputError, match=f"cannot write place: .*{advice}"),
-        output_errors("place"),
-    ):
-        raise OSError(code, os.strerror(code))

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from nrdf import cli
-from nrdf.errors import CloudError, DataError
+from nrdf.errors import DataError
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import read_cloud
@@ -153,20 +153,6 @@ def test_a_members_scan_knows_its_surface_coordinates(category):
 def test_settings_without_sense_are_refused(settings, message):
     with pytest.raises(DataError, match=message):
         look(settings=settings)
-
-
-def test_upright_and_axes():
-    for name in ("x", "y", "z", "-x", "-y", "-z", "1 2 3"):
-        up = up_axis(name)
-        rotation = upright(up)
-        np.testing.assert_allclose(rotation @ [0, 1, 0], up, atol=1e-12)
-        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
-        assert np.linalg.det(rotation) == pytest.approx(1)
-    np.testing.assert_allclose(upright(up_axis("y")), np.eye(3))
-    np.testing.assert_allclose(rotation_about_up(np.pi / 2) @ [0, 0, 1], [1, 0, 0], atol=1e-12)
-    for wrong in ("w", "0 0 0", "1 2", "+z"):
-        with pytest.raises(CloudError, match="no direction; give one of x, y"):
-            up_axis(wrong)
 
 
 def test_the_command_writes_the_scan_and_the_truth(tmp_path, capsys):
