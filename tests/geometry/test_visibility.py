@@ -38,7 +38,7 @@ def test_both_sides_are_seen_of_an_open_surface_only():
 def test_points_are_seen_from_the_side_that_they_face():
     points, normals = box(np.random.default_rng(0), 4000, (1.0, 1.0, 1.0))
     above, below = seen_from(points, normals, np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]))
-    inner = (np.abs(points[:, [0, 2]]) < 0.44).all(axis=1)  # the sides are in the edges' pixels
+    inner = (np.abs(points[:, [0, 2]]) < 0.42).all(axis=1)  # the sides are in the edges' pixels
     np.testing.assert_array_equal(above[inner], normals[inner, 1] > 0)
     np.testing.assert_array_equal(below[inner], normals[inner, 1] < 0)
 
