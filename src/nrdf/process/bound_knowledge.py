@@ -120,8 +120,8 @@ def unit_and_warnings(
                 f"{what} does not say its unit, and its longest side, {size:.4g}, does not tell "
                 f"it{_usual(category)}: give {option} ({', '.join(METRES)})"
             )
-        told = f"because its longest side is {size:.4g}{_usual(category)}"
-        warnings.append(f"{what} does not say its unit; taken to be {known}, {told}")
+        reason = f"because its longest side is {size:.4g}{_usual(category)}"
+        warnings.append(f"{what} does not say its unit; taken to be {known}, {reason}")
     metres = size * METRES[known]
     low, high = USUAL_SIZES.get(category, (0.0, np.inf))
     if not low / _ODD_SIZE <= metres <= high * _ODD_SIZE:
@@ -131,7 +131,7 @@ def unit_and_warnings(
 
 
 def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:
-    """The files that knowledge refers to; their names count from `folder`."""
+    """The files that a knowledge refers to; names are relative to `folder`."""
     names = [knowledge.reference.cloud, *(region.file for region in knowledge.regions)]
     return [Path(folder) / name for name in names if name is not None]
 
@@ -139,7 +139,7 @@ def files_of(knowledge: Knowledge, folder: str | Path) -> list[Path]:
 def checksum(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal digits.
 
-    Raises ProcessError for what is no regular file, a bag's folder for instance.
+    Raises ProcessError if it is not a regular file, for instance the folder of a bag.
     """
     digest = hashlib.sha256()
     with open_file(path, ProcessError) as file:

@@ -51,8 +51,8 @@ class CheckedProcess:
 def check_knowledge(
     bound_knowledge: BoundKnowledge, progress: Callable[[int, int], None] | None = None
 ) -> list[CheckedProcess]:
-    """Plan and measure every process on the reference; `progress` is told (done, all)."""
-    # The same points as a model would work with.
+    """Plan and measure every process on the reference; `progress` is called with (done, all)."""
+    # The same points that a model works with.
     kept = downsample(bound_knowledge.cloud.points, WORKING_POINTS, np.random.default_rng(0))
     cloud = bound_knowledge.cloud.select(kept)
     normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
@@ -109,7 +109,7 @@ def check_process(
 
 
 def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:
-    """Raise ProcessError for waypoints farther apart than the region is long, unless meant."""
+    """Raise ProcessError for a spacing longer than the region, unless `allow_unusual` is set."""
     length = max(patch.extent[0] for patch in patches_of(surface, region))
     if process.spacing_m > length and not process.allow_unusual:
         spacing = f"{process.spacing_m:g} ({in_words('spacing_m', process.spacing_m)})"

@@ -1,4 +1,4 @@
-"""Knowledge as YAML that people read: comments give meanings, and SI values in mm and °."""
+"""Knowledge as commented YAML: the meaning of each field, and SI values in mm and degrees."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EXPLANATION = """\
 """
 _WIDTH = 100
 _RARE = ("origin", "mask", "indices", "points_m", "normals")
-"""Fields that are not offered where they are not set."""
+"""Fields that are left out where they are not set, even in an explained file."""
 
 
 def to_yaml(knowledge: Knowledge, explained: bool) -> str:
@@ -33,7 +33,7 @@ def to_yaml(knowledge: Knowledge, explained: bool) -> str:
 
 
 class _Lines:
-    """Lines of YAML; the meaning of each model's fields is given where it first occurs."""
+    """Writes YAML line by line; explains the fields of each model where it first occurs."""
 
     def __init__(self, explained: bool) -> None:
         self.explained = explained
@@ -77,13 +77,13 @@ def _commented(line: str, comment: str, indent: str) -> Iterator[str]:
     elif len(line) + len(comment) + 4 <= _WIDTH:
         yield f"{line}  # {comment}"
     else:
-        room, words = "", comment.split()
+        text, words = "", comment.split()
         for word in words:
-            if len(indent) + len(room) + len(word) + 3 > _WIDTH:
-                yield f"{indent}#{room}"
-                room = ""
-            room += f" {word}"
-        yield f"{indent}#{room}"
+            if len(indent) + len(text) + len(word) + 3 > _WIDTH:
+                yield f"{indent}#{text}"
+                text = ""
+            text += f" {word}"
+        yield f"{indent}#{text}"
         yield line
 
 

@@ -67,7 +67,7 @@ class Limits:
                 (FRACTION if name == "min_coverage" else NON_NEGATIVE).check(name, value)
 
     def broken(self, result: TransferResult) -> list[str]:
-        """A line for each limit that is not met: by which region and process, and by how much."""
+        """A message for each limit that is not met: where, and by how much."""
         lines = []
         if result.kind is not None and not self.any_kind:
             lines += [f"{w} (--any-kind: take it all the same)" for w in result.kind.warnings]
@@ -104,6 +104,6 @@ class Limits:
              metrics.turn_worst_rad, self.max_turn_rad),
         ):  # fmt: skip
             if limit is not None and value is not None and value > limit:
-                said = f"{in_words(name, value)}, above {in_words(name, limit)}"
-                lines.append(f"the {what} is {said}")
+                excess = f"{in_words(name, value)}, above {in_words(name, limit)}"
+                lines.append(f"the {what} is {excess}")
         return lines

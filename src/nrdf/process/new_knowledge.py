@@ -54,7 +54,7 @@ DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
     },
     "custom": {"name": "what is done", "tool": _PAD, "overlap": 0.3, "feed_mm_s": 100},
 }  # fmt: skip
-"""What each kind of process begins with."""
+"""Default values for each kind of process."""
 
 
 def new_knowledge(

@@ -17,7 +17,7 @@ _STEEPEST_RAD = np.radians(5.0)
 
 
 def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
-    """What a person should look at before a path is driven."""
+    """What a person should look at before a path runs on a robot."""
     lines = []
     if metrics.left_out[NO_CLEARANCE] > 0.0:
         clearance = in_words("clearance_m", process.tool.clearance_m)
@@ -37,8 +37,8 @@ def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
             f"{in_words('stepover_m', stepover)} were asked for"
         )
     if process.trajectory != "taught" and metrics.step_worst_m > _LARGEST_STEP * process.spacing_m:
-        step, asked = (in_words("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
-        lines.append(f"a step of {step} between neighbouring waypoints; {asked} were asked for")
+        step, requested = (in_words("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
+        lines.append(f"a step of {step} between neighbouring waypoints; {requested} were asked for")
     if metrics.turn_worst_rad > _LARGEST_TURN_RAD:
         turn = in_words("_rad", metrics.turn_worst_rad)
         lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")

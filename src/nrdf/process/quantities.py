@@ -99,7 +99,7 @@ Direction = Annotated[Vector, AfterValidator(_direction)]
 Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_quaternion)]
 FileName = Annotated[str, Field(max_length=4096), AfterValidator(_file_name)]
 PlainMapping = Annotated[dict[str, Any], AfterValidator(_plain)]
-"""Whatever else is said: anything that YAML and JSON can hold."""
+"""Free content: anything that YAML and JSON can hold."""
 
 
 class Quantities(StrictModel):
@@ -125,9 +125,9 @@ class Quantities(StrictModel):
         properties = schema.get("properties", {})
         for name in list(properties):
             for plausible in _plausible_ranges(cls, name):
-                told = f"Plausible: {plausible.least:.6g} to {plausible.most:.6g}."
-                said = properties[name].get("description", "")
-                properties[name]["description"] = f"{said} {told}".strip()
+                hint = f"Plausible: {plausible.least:.6g} to {plausible.most:.6g}."
+                description = properties[name].get("description", "")
+                properties[name]["description"] = f"{description} {hint}".strip()
             for other, factor in other_names(name).items():
                 properties[other] = _scaled(properties[name], 1 / factor)
                 properties[other]["description"] = f"Instead of {name}."

@@ -113,10 +113,10 @@ def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
 
 def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:
     """The knowledge for the target: its regions, and its processes as they were transferred."""
-    taught = result.bound_knowledge.knowledge
+    knowledge = result.bound_knowledge.knowledge
     regions = []
-    for region in taught.regions:
-        # In the file's order, whatever the order in which they are driven.
+    for region in knowledge.regions:
+        # In the file's order, whatever their order of execution.
         done = [
             step.process
             for number in range(len(region.processes))
@@ -131,10 +131,10 @@ def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) 
     reference = Reference(cloud=TARGET, sha256=checksum(folder / TARGET), frame=frame)
     keys = ("command", "knowledge", "target", "model", "date")
     return Knowledge(
-        category=taught.category,
+        category=knowledge.category,
         reference=reference,
-        allow_unusual=taught.allow_unusual,
-        allow_overlap=taught.allow_overlap or bool(overlaps(found)),
+        allow_unusual=knowledge.allow_unusual,
+        allow_overlap=knowledge.allow_overlap or bool(overlaps(found)),
         regions=regions,
         origin={key: origin[key] for key in keys if key in origin},
     )

@@ -39,8 +39,8 @@ def transfer_report(result: TransferResult, limits: Limits) -> dict[str, Any]:
     warnings += result.warnings
     for step in paths:
         if step["warnings"]:
-            said = "; ".join(step["warnings"])
-            warnings.append(f"region '{step['region']}', {step['process']}: {said}")
+            joined = "; ".join(step["warnings"])
+            warnings.append(f"region '{step['region']}', {step['process']}: {joined}")
     return {
         "category": result.bound_knowledge.knowledge.category,
         "unit": "m",
@@ -147,7 +147,7 @@ def metric_cells(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def short_metric_cells(metrics: Mapping[str, Any]) -> list[str]:
-    """The metrics that a terminal has room for, one for each of `SHORT_METRIC_COLUMNS`."""
+    """The metrics shown in a terminal, one for each of `SHORT_METRIC_COLUMNS`."""
     shares = shares_in_words(metrics).removesuffix(" %").split(" · ")
     lengths = ("line_spacing_worst_m", "step_worst_m", "true_distance_95_m")
     spacing, step, off = (_millimetres(metrics[name]).removesuffix(" mm") for name in lengths)
