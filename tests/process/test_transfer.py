@@ -109,7 +109,7 @@ def test_a_strategy_is_planned_anew_on_the_target(transferred):
     assert process_segments(step)[0].force_n == 10
 
 
-def test_a_carried_strategy_has_the_references_lines(transferred):
+def test_a_warped_strategy_has_the_references_lines(transferred):
     step = transferred.paths[2]
     assert step.transfer_mode == "warp" and step.process.trajectory == "taught"
     assert step.process.transfer is None and step.process.transfer_mode == "warp"
@@ -119,7 +119,7 @@ def test_a_carried_strategy_has_the_references_lines(transferred):
     np.testing.assert_allclose(process_segments(step)[0].positions, first)
 
 
-def test_taught_waypoints_are_carried_and_get_their_tools(transferred):
+def test_taught_waypoints_are_warped_and_get_their_tools(transferred):
     step = transferred.paths[3]
     (segment,) = process_segments(step)
     given = np.array(TAUGHT["waypoints"][0]["positions_m"])
@@ -178,7 +178,7 @@ def test_regions_that_overlap_on_the_target_are_said(model):
     assert any("regions 'top' and 'right' overlap" in line for line in result.warnings)
 
 
-def test_paths_are_judged_by_the_mesh_that_was_given(model):
+def test_paths_are_compared_with_the_mesh_that_was_given(model):
     """Its points lie 5 mm outside of the box: planned on them, all is well."""
     target = cloud(seed=1)
     box = trimesh.creation.box(SIZE - 0.01)
@@ -196,7 +196,7 @@ def test_paths_are_judged_by_the_mesh_that_was_given(model):
     assert re.match(r"1 % of the way on the surface is more than \d", warning)
 
 
-def test_paths_are_judged_by_all_points_of_a_cloud_that_is_thinned(model):
+def test_paths_are_compared_with_all_points_of_a_cloud_that_is_thinned(model):
     """All points are 4 mm deeper on the top than those that a model works on."""
     target = cloud(seed=1)
     deeper = target.points - [0.0, 0.004, 0.0] * (target.normals[:, 1:2] > 0.5)
@@ -267,10 +267,10 @@ def test_a_file_is_taught_and_a_folder_written(untrained, tmp_path):
 
 
 def test_points_in_use_are_found_again(model):
-    embedded = model.encode(cloud(count=20_000))
+    encoded = model.encode(cloud(count=20_000))
     some = np.arange(0, 20_000, 3)
-    found = embedded.to_working(some)
-    np.testing.assert_array_equal(embedded.working[found], np.intersect1d(embedded.working, some))
+    found = encoded.to_working(some)
+    np.testing.assert_array_equal(encoded.working[found], np.intersect1d(encoded.working, some))
 
 
 def test_taught_spots_are_warped_one_by_one(model):

@@ -1,4 +1,4 @@
-"""Crevices and other places without room for a tool."""
+"""Crevices and other places that a tool cannot access."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def stacked(gap):
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.01, 0.025])
-def test_what_lies_under_another_part_has_no_room(gap):
+def test_what_lies_under_another_part_has_no_clearance(gap):
     surface, top = stacked(gap)
     free = accessible_points(surface, top, 0.03)
     x, _, z = np.abs(surface.points[top]).T
@@ -61,10 +61,10 @@ def test_a_plan_keeps_out_and_its_figures_say_how_much():
     segments = plan(surface, top, strategy)
     work = np.concatenate([s.positions for s in segments if s.kind == "process"])
     assert work[:, 0].max() < 0.01
-    figures = measure_path(surface, top, strategy, segments)
-    assert figures.left_out["no_clearance"] == pytest.approx(0.5, abs=0.03)
-    assert figures.coverage == pytest.approx(0.5, abs=0.03)  # of the whole region
-    assert figures.unreached < 0.01
+    metrics = measure_path(surface, top, strategy, segments)
+    assert metrics.left_out["no_clearance"] == pytest.approx(0.5, abs=0.03)
+    assert metrics.coverage == pytest.approx(0.5, abs=0.03)  # of the whole region
+    assert metrics.unreached < 0.01
     assert measure_path(surface, top, Strategy(tool_radius_m=0.02), segments).coverage < 0.65
 
 

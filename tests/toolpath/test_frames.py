@@ -30,7 +30,7 @@ def test_a_travel_along_the_normal_still_gives_a_frame():
 
 
 @pytest.mark.parametrize("angle", [0.2, -0.4])
-def test_lead_leans_the_tail_towards_the_travel_and_tilt_to_its_right(angle):
+def test_lead_tilts_the_tail_towards_the_travel_and_tilt_to_its_right(angle):
     for lead, tilt, side in ((angle, 0.0, FORWARD), (0.0, angle, RIGHT)):
         quaternions = tool_quaternions(np.array([FORWARD]), np.array([UP]), lead, tilt)
         tail = -Rotation.from_quat(quaternions[0]).as_matrix()[:, 2]

@@ -1,4 +1,4 @@
-"""The report's figures, on paths whose figures are known."""
+"""Metrics of paths for which they are known."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_a_step_counts_where_the_tool_is_as_well_as_on_the_surface():
     assert found.step_worst_m > 0.05
 
 
-def test_the_object_as_given_judges_what_the_plan_cannot_see():
+def test_the_object_as_given_shows_what_the_plan_cannot_see():
     """The plan's surface is 4 mm above the mesh: by itself it is without fault."""
     mesh = MeshSurface(
         np.array([[-1, -1, -4e-3], [2, -1, -4e-3], [0, 3, -4e-3]], float), [[0, 1, 2]]
@@ -117,7 +117,7 @@ def test_the_object_as_given_judges_what_the_plan_cannot_see():
     assert alone.compared_with is None and alone.true_distance_worst_m is None
 
 
-def test_the_way_between_waypoints_is_judged_as_well():
+def test_the_surface_between_waypoints_is_compared_as_well():
     """Both waypoints are on the valley's rims, the straight way between them is above it."""
     rims = np.array(
         [[0, -1, 0], [0, 1, 0], [0.2, -1, -0.1], [0.2, 1, -0.1], [0.4, -1, 0], [0.4, 1, 0]]
@@ -188,12 +188,12 @@ def test_height_over_the_surface_counts_but_the_stand_off_does_not():
 
 
 def test_the_axis_is_compared_with_the_one_asked_for():
-    leaned = DOWN * Rotation.from_euler("Y", -0.25)
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, turn=leaned))
+    tilted = DOWN * Rotation.from_euler("Y", -0.25)
+    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, turn=tilted))
     assert found.axis_error_99_rad == pytest.approx(0.25, abs=1e-6)
     asked = replace(STRATEGY, lead_rad=0.25)
     assert (
-        measure_path(SURFACE, REGION, asked, lines(0.1, 0.2, turn=leaned)).axis_error_99_rad < 1e-6
+        measure_path(SURFACE, REGION, asked, lines(0.1, 0.2, turn=tilted)).axis_error_99_rad < 1e-6
     )
 
 

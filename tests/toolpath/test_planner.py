@@ -141,7 +141,7 @@ def test_a_rigid_motion_moves_the_path_and_changes_nothing():
         assert error.max() < np.radians(2)
 
 
-def test_the_tool_leans_and_stands_off_along_its_axis():
+def test_the_tool_tilts_and_stands_off_along_its_axis():
     lead, tilt, standoff = 0.3, -0.2, 0.05
     segments = planned(*board(), lead_rad=lead, tilt_rad=tilt, standoff_m=standoff)
     for line in processes(segments):

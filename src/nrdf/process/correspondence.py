@@ -24,7 +24,7 @@ FARTHEST, BEYOND, LEAST_TRUST = 0.06, 0.025, 0.3
 """A waypoint has a counterpart where C trusts the point that it gives, and where that point is at
 most so far off the target's points: in all, and beyond an edge or in a hole. Shares of the longest
 side, the distance between points not counted."""
-_AROUND = 12  # points that tell whether a point is on the surface between them
+_AROUND = 12  # points that decide whether a point is on the surface between them
 _ANCHORS = 1200  # points of the reference whose positions are refined
 _BLENDED, _BLEND = 8, 0.005  # anchors that a point follows, and the distance that softens it
 _REGISTRATION = RegistrationSettings(
@@ -74,8 +74,8 @@ class ReferenceSurface:
 class Correspondence:
     """The mapping from a reference's surface to a target's, both in metres.
 
-    The inverse descriptor function C is asked twice, the second time with both objects mirrored in
-    z, which gives an object of the category as well; the mean is better than either. A smooth,
+    The inverse descriptor function C is evaluated twice, the second time with both objects mirrored
+    in z, which gives an object of the category as well; the mean is better than either. A smooth,
     small displacement, as in registration, then brings the whole mapped reference closer to the
     target, so that edges come to lie on edges.
     """
@@ -96,7 +96,7 @@ class Correspondence:
         return _mirrored(self.reference.encoded.model, self.target)
 
     def _mapped(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
-        """The mean of what C says of points (m, 3) of the reference and of their mirror images."""
+        """The mean of where C puts points (m, 3) of the reference and their mirror images."""
         encoded, reference = self.reference.encoded, self.reference.encoded.reference
         one = encoded.map_surface_points(points, normals, self.target)
         other = self.reference.mirrored.map_surface_points(
@@ -134,10 +134,10 @@ class Correspondence:
         """
         target, whole = self.target, self.reference.encoded.reference
         mapped = self._mapped(points, normals)
-        asked = oriented_features(
+        features = oriented_features(
             whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
         )
-        distance, near = self.reference.tree.query(asked, _BLENDED)
+        distance, near = self.reference.tree.query(features, _BLENDED)
         weight = 1.0 / (distance + _BLEND) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
         arrived = mapped.points + np.einsum("mk,mka->ma", weight, self._registered[near])
@@ -174,7 +174,7 @@ class Correspondence:
         """A direction (3,) at a region of the reference, unit length, as it is on the target.
 
         region: (k,) indices into the reference's cloud. The smooth map between the two regions is
-        taken as affine; across the surface, where points do not tell, as a turn and a scale.
+        taken as affine; across the surface, where points say nothing, as a rotation and a scale.
         """
         encoded = self.reference.encoded
         here = encoded.reference.cloud.points[region]
@@ -182,7 +182,7 @@ class Correspondence:
         here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
         spread = here.T @ here
         size = float(np.trace(spread))
-        if len(here) < 3 or size == 0.0:  # a spot does not tell how it is turned
+        if len(here) < 3 or size == 0.0:  # a spot has no orientation
             canonical = encoded.reference.canonical_normals(np.asarray(direction, float))
             return unit_vectors(self.target.original_normals(canonical))
         turn, _ = Rotation.align_vectors(there, here)

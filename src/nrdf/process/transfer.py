@@ -95,19 +95,21 @@ class ProcessTransfer:
         """Find the regions on a target, and bring every process there.
 
         target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in the
-        category's orientation, or an EncodedCloud in any pose, in metres. unit: of the target,
-        where its file did not say. min_confidence: a region that is found nowhere, or with less
-        mean confidence, is skipped; a process that does not fit its region there is left out with
-        the reason. marked: regions that a person has marked on the target, by name, as
-        `region_indices` takes them, points in metres; they are taken as they are, and a mask that
-        is False everywhere says that the region is not there. progress: is told (done, all) steps.
-        target_warnings: what is uncertain about the target's pose and unit; unless given, its unit
-        is checked here, and logged as a warning where it is uncertain. whole: the target before it
-        was thinned, in metres, which tool paths are compared with. kind: what the target was found
-        to look like; it is checked here unless given.
+            category's orientation, or an EncodedCloud in any pose, in metres.
+        unit: of the target, where its file did not say.
+        min_confidence: a region that is found nowhere, or with less mean confidence, is skipped. A
+            process that does not fit its region on the target is left out, with the reason.
+        marked: regions that a person has marked on the target, by name, as `region_indices` takes
+            them, points in metres. They are taken as they are. A mask that is False everywhere says
+            that the region is not there.
+        progress: called with (done, all) steps.
+        target_warnings: what is uncertain about the target's pose and unit. Unless given, its unit
+            is checked here, and logged as a warning where it is uncertain.
+        whole: the target before it was thinned, in metres, which tool paths are compared with.
+        kind: what the target was found to look like; checked here unless given.
 
-        Raises CloudError for a target that cannot be used, ProcessError for one whose unit nothing
-        tells, RegionError for a marked region that is not taught or not on the target, ConfigError
+        Raises CloudError for a target that cannot be used, ProcessError for one whose unit is not
+        known, RegionError for a marked region that is not taught or not on the target, ConfigError
         for a `min_confidence` that is no share.
         """
         FRACTION.check("min_confidence", min_confidence)

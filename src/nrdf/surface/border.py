@@ -1,4 +1,4 @@
-"""Where a region ends, told from points that stand on either side of its border."""
+"""Where a region ends, estimated from the points on either side of its border."""
 
 from __future__ import annotations
 

@@ -19,12 +19,12 @@ from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
 from nrdf.surface.surface import quadrics
 
-_NEIGHBOURS, _LEAST = 24, 6  # points that tell the surface between them
+_NEIGHBOURS, _LEAST = 24, 6  # points that the surface between them is fitted to
 _FACING, _ALIKE = 0.2, 0.7  # cosines: to the tool's axis; between normals of one sheet
-_SPACING_BY = 7  # the neighbour that tells how far apart points are
+_SPACING_BY = 7  # the neighbour whose distance gives the spacing of points
 _GAP = 1.5  # spacings to the next point within which the surface is taken to go on
 _CHUNK = 1 << 14
-_ASKED = 500  # points that tell the spacing of all
+_ASKED = 500  # points whose spacing stands for that of all
 _LEAST_AREA = 1e-14  # of a face, in squares of the mesh's longest side
 
 

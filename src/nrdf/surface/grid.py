@@ -46,7 +46,7 @@ class Grid:
         return ndimage.gaussian_filter(count / self.pitch**2, sigma / self.pitch, mode="constant")
 
     def smooth(self, uv: np.ndarray, values: np.ndarray, sigma: float) -> np.ndarray:
-        """`values` (n, k) at `uv` (n, 2) as smooth fields (k, rows, columns), carried on beyond."""
+        """`values` (n, k) at `uv` (n, 2) as smooth fields (k, rows, columns), extended beyond."""
         near, far = self.density(uv, sigma), self.density(uv, 5.0 * sigma)
         ground = 1e-6 * far.max()
         fields = [

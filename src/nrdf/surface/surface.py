@@ -31,8 +31,8 @@ class Surface:
     """An object's points with outward normals, as a surface to work on.
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
-    part are told apart by their normals alone. There is one row for each point given, so a region
-    is an array of indices of the points given; none of them should be in the place of another
+    part are distinguished by their normals alone. There is one row for each point given, so a
+    region is an array of indices of the points given; none of them should repeat another one
     (`surface_subset`). found: what other modules have found out about the surface, for their next
     call. Raises ProcessError if the two do not fit each other, are not finite, or are fewer than 8.
     """
@@ -85,7 +85,7 @@ class Surface:
     def edges(self) -> np.ndarray:
         """LineNeighbours (e, 2) on one sheet, each pair once, the lower index first.
 
-        Pairs that lean out of each other's tangent plane, or whose normals differ much, are left
+        Pairs that rise out of each other's tangent plane, or whose normals differ much, are left
         out, so that no edge leads through a thin part.
         """
         distance, near = self._nearest
@@ -111,7 +111,7 @@ class Surface:
     def project(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nearest places on the smooth surface, and its normals there, each (m, 3).
 
-        points: (m, 3), m, near the surface; normals: (m, 3), roughly outward, tell the side.
+        points: (m, 3), m, near the surface; normals: (m, 3), roughly outward, choose the side.
         Moving least squares: a quadric over the tangent plane, fitted to the nearest points of the
         side (Alexa et al., 2003). A point with no surface of its side around stays where it is.
         """

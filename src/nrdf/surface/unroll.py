@@ -80,8 +80,8 @@ def unroll(points: np.ndarray, normals: np.ndarray, edges: np.ndarray, spacing: 
     z -= z.mean()
     axis = np.sqrt((z * z).mean() + 1e-300)
     axis /= np.abs(axis)
-    lean = ((z * np.conj(axis)).real ** 3).mean()
-    axis *= -1.0 if lean < 0.0 else 1.0
+    skew = ((z * np.conj(axis)).real ** 3).mean()
+    axis *= -1.0 if skew < 0.0 else 1.0
     z, turn = z * np.conj(axis), turn * np.conj(axis)
     # u runs along frame direction conj(turn), v along i conj(turn).
     c, s = turn.real[:, None], -turn.imag[:, None]

@@ -1,4 +1,4 @@
-"""Tool frames on a surface: x along the travel, z into the part, tilted as asked for."""
+"""Tool frames on a surface: x along the travel, z into the part, tilted by lead and tilt."""
 
 from __future__ import annotations
 

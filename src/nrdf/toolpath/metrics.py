@@ -88,8 +88,8 @@ class ToolPathMetrics:
     surface_distance_*: of the process waypoints from the smooth surface that they were planned on,
     at the stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on
     the surface that are worked, along the lines and between waypoints too, from the object as it
-    was given (`nrdf.surface.given_surface`), which compared_with names; less than resolution_m it
-    cannot tell. None where it is not known.
+    was given (`nrdf.surface.given_surface`), which compared_with names; distances below
+    resolution_m mean nothing. None where it is not known.
 
     axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
     step_worst_m, turn_worst_rad, bend_worst_rad_m: the largest step between neighbouring waypoints
@@ -220,15 +220,15 @@ def _fit(
     _, _, off = surface.nearest(everywhere, tails)
     off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
     smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
-    asked = []
+    planned = []
     cuts = np.cumsum([len(line) for line in contacts])[:-1]
     for line, normals in zip(contacts, np.split(smooth, cuts), strict=True):
         # A waypoint alone has no travel; for a tool that is not tilted, any will do.
         travel = (
             travel_directions(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
         )
-        asked.append(surface_frames(travel, normals))
-    axes = (Rotation.from_matrix(np.concatenate(asked)) * tilt).as_matrix()[:, :, 2]
+        planned.append(surface_frames(travel, normals))
+    axes = (Rotation.from_matrix(np.concatenate(planned)) * tilt).as_matrix()[:, :, 2]
     cosine = np.einsum("na,na->n", axes, held.as_matrix()[:, :, 2])
     return off, np.arccos(np.clip(cosine, -1.0, 1.0))
 

@@ -44,7 +44,7 @@ def raster(
 
 
 def _long(paths: list[PlanarPath], least: float) -> list[PlanarPath]:
-    """Strokes no shorter than `least`; the longest, if there are none."""
+    """Paths no shorter than `least`; the longest, if there are none."""
     length = [total_length(s) for s in paths]
     least = min(least, max(length))
     return [path for path, way in zip(paths, length, strict=True) if way >= least]
@@ -88,7 +88,7 @@ def _part(
     clearance: Callable[[np.ndarray], np.ndarray],
     stepover: float,
 ) -> list[PlanarPath]:
-    """Strokes of the part of a grid that is `inside`; across: distance square to the lines."""
+    """Paths of the part of a grid that is `inside`; across: distance square to the lines."""
     low, high = across[inside].min(), across[inside].max()
     levels = low + strip_middles(high - low, stepover)
     near = ndimage.binary_dilation(inside, np.ones((3, 3)))

@@ -18,7 +18,7 @@ from nrdf.toolpath.surface_path import SurfacePath
 _FACING = 0.2
 """Least cosine between the tool's axis and the normal of a place that its footprint reaches."""
 # Lines are beside each other where they run the same way or back, within 30 degrees, and the region
-# goes on between them beyond doubt: its border is known to about half the points' spacing.
+# goes on between them for certain: its border is known to about half the points' spacing.
 _PARALLEL, _SURE, _LOOKS = np.cos(np.pi / 6), 0.5, 9
 _NEXT_TO = 8  # points of which one is next to a place, on its side
 

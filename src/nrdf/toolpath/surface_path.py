@@ -99,7 +99,7 @@ def find_contacts(
 
 
 def order_nearest_first(blocks: list[list[SurfacePath]]) -> list[list[SurfacePath]]:
-    """Blocks of lines ordered, and driven forwards or backwards, so that ways between are short."""
+    """Blocks of lines in an order, and each in a direction, that keeps the moves between short."""
     waiting, ordered = list(blocks), []
     place: np.ndarray | None = None
     while waiting:
