@@ -59,7 +59,7 @@ def test_align_writes_pose_object_and_picture(files, tmp_path, capsys):
     assert set(report["files"]) == {"aligned.ply", "object.ply", "picture.png", "report.json"}
     found = similarity(report)
     assert yaw_error(found, PLACE) < 5 and found.scale == pytest.approx(850, rel=0.03)
-    assert report["unit"] == {"name": "mm", "origin": "guessed"} and report["doubts"] == []
+    assert report["unit"] == {"name": "mm", "origin": "guessed"} and report["warnings"] == []
     assert [step["name"] for step in report["cleaning"]][:3] == ["thin", "duplicates", "floor"]
     kept, aligned = read_cloud(out / "object.ply"), read_cloud(out / "aligned.ply")
     np.testing.assert_allclose(found.to_scan(aligned.points), kept.points, atol=1e-3)
@@ -154,7 +154,7 @@ def test_a_real_scan_goes_through(files, tmp_path):
     report = json.loads((out / "report.json").read_text())
     best = similarity(report["alignment"])
     assert 0.65 < best.scale < 0.75 and report["alignment"]["kind"]["fits"]
-    assert report["alignment"]["probability"] > 0.9 and report["alignment"]["doubts"] == []
+    assert report["alignment"]["probability"] > 0.9 and report["alignment"]["warnings"] == []
     seat, back, leg = (
         best.to_canonical(read_cloud(out / f"{name}.ply").points)
         for name in ("seat", "back-front", "leg-left-front")

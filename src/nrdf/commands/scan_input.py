@@ -92,7 +92,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "field_cost": round(best.field_cost, 4),
         "usual_cost": round(found.scorer.usual_cost, 4),
         "kind": found.kind.describe(),
-        "doubts": found.warnings,
+        "warnings": found.warnings,
         "unit": {"name": unit.name, "origin": unit.origin},
         "sensors": None if sensors is None else sensors,
         "candidates": [
