@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from nrdf.toolpath.types import Segment
 
@@ -48,3 +51,25 @@ def write_plate_job(folder):
         segments.append(Segment("process", number, line, turned, 0.1, 10.0))
     whole = np.concatenate([top, below]), np.concatenate([up, -up])
     return write_job_on(folder, *whole, 2500, segments)
+
+
+def turned_job(job, folder, pose):
+    """The job of one folder, its object and tool paths, in another frame and folder."""
+    import nrdf
+    from nrdf.toolpath.file import read_toolpaths, write_toolpaths
+
+    def turned(segment):
+        held = Rotation.from_matrix(pose.rotation) * Rotation.from_quat(segment.quaternions_xyzw)
+        positions = pose.to_scan(segment.positions)
+        return replace(segment, positions=positions, quaternions_xyzw=held.as_quat())
+
+    (folder / "knowledge.yaml").write_text((job / "knowledge.yaml").read_text())
+    cloud = nrdf.read_cloud(job / "target.ply")
+    normals = cloud.normals @ pose.rotation.T
+    nrdf.write_cloud(
+        folder / "target.ply", replace(cloud, points=pose.to_scan(cloud.points), normals=normals)
+    )
+    whole = read_toolpaths(job)
+    paths = tuple(replace(p, segments=tuple(map(turned, p.segments))) for p in whole.paths)
+    write_toolpaths(folder, replace(whole, paths=paths, pose=pose))
+    return folder

@@ -1,0 +1,30 @@
+"""Pictures of the arm, where this machine can draw."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nrdf.robot.report.pictures import COVERAGE, STILL, _parts, draw_pictures
+
+
+def test_pictures_show_arm_and_object(plate, tmp_path):
+    from matplotlib.image import imread
+
+    missing = draw_pictures(tmp_path, plate, film=False)
+    if missing:
+        pytest.skip(missing)
+    still, coverage = imread(tmp_path / STILL)[..., :3], imread(tmp_path / COVERAGE)[..., :3]
+    # The bundled arm's joints are blue; what was worked is green.
+    assert ((still[..., 2] > 1.3 * still[..., 0]) & (still[..., 2] > 0.25)).mean() > 0.003
+    assert ((coverage[..., 1] > 1.5 * coverage[..., 0]) & (coverage[..., 1] > 0.2)).mean() > 0.01
+
+
+def test_the_mesh_is_cut_by_colour_and_stays_whole(plate):
+    parts = _parts(plate, "coverage")
+    assert len(parts) == 3, "not in a region, worked, and not worked"
+    faces = sum(len(faces) for _, faces, _ in parts)
+    assert faces == pytest.approx(len(plate.distance_field.faces), abs=9)
+    for vertices, faces, colour in parts:
+        assert faces.max() == len(vertices) - 1 and len(colour) == 3
+    assert np.isfinite(parts[0][0]).all()
