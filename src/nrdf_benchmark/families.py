@@ -15,15 +15,15 @@ from nrdf.shapes.families import get_family
 FIRST_SEED = 1_000_000
 """Members from this seed on are never trained on (`nrdf model synth` starts at 0)."""
 CLOUD_POINTS = 8192
-PLACES = 2048
+COMPARED_POINTS = 2048
 
 
 @dataclass(frozen=True)
 class FamilyResult:
     """Distances in canonical lengths (longest side 1), one value a pair: (pairs,).
 
-    field: of C's prediction from the exact place; box: of the copy scaled to the target's
-    bounding box; shared: share of the reference's places that the target has at all.
+    field: of C's prediction from the exact position; box: of the copy scaled to the target's
+    bounding box; shared: share of the reference's surface points that the target has at all.
     """
 
     category: str
@@ -45,7 +45,7 @@ def evaluate_family(
 ) -> FamilyResult:
     """Ask C for exact correspondences of `pairs` pairs of unseen members.
 
-    Each reference is a cloud of its own surface, its normals known; places that the target lacks
+    Each reference is a cloud of its own surface, its normals known; points that the target lacks
     ("none") are left out of the error. `progress` is told (done, all). Raises DataError for a
     category without a family, or no pairs.
     """
@@ -61,10 +61,10 @@ def evaluate_family(
         other = target.sample_surface(CLOUD_POINTS, rng)
         truth = target.locate(surface.coordinates)
         shared = np.flatnonzero(truth.exists)
-        chosen = rng.permutation(shared)[:PLACES]
-        taught = model.set_reference(PointCloud(surface.points, surface.normals))
-        embedded = model.encode(PointCloud(other.points, other.normals))
-        mapped = embedded.original(taught.map_points(chosen, embedded).points)
+        chosen = rng.permutation(shared)[:COMPARED_POINTS]
+        encoded_reference = model.set_reference(PointCloud(surface.points, surface.normals))
+        encoded = model.encode(PointCloud(other.points, other.normals))
+        mapped = encoded.original(encoded_reference.map_points(chosen, encoded).points)
         low, high = surface.points.min(0), surface.points.max(0)
         other_low, other_high = other.points.min(0), other.points.max(0)
         box = (surface.points[chosen] - low) / (high - low) * (other_high - other_low) + other_low

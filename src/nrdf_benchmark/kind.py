@@ -1,7 +1,7 @@
 """How well the check of the kind of object tells: real objects of it, turned ones, and others.
 
 The others are meshes of everyday objects of which training has seen none of the same name
-(`nrdf.training.kind_network.is_held_out`). Definitions of the figures: docs/evidence/scans.md.
+(`nrdf.training.kind_network.is_held_out`). Definitions of the results: docs/evidence/scans.md.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ log = logging.getLogger(__name__)
 
 OWN = {"chair": ("chair", "stool", "bench"), "car": (), "plane": ("glider",)}
 """Words in names of everyday objects that are of the category, or sat on as such: no others."""
-DOUBTED, PASSED, SCANS = 0.95, 0.03, 0.05
-"""At least so many of what is wrong must be doubted, at most so many of what is right, of which
+LEAST_WARNED, MOST_WARNED, MOST_WARNED_SCANS = 0.95, 0.03, 0.05
+"""At least so many of what is wrong must get a warning, at most so many of what is right, of which
 scans brought in by alignment."""
 VIEWS = "3 views"
 FURNITURE = ("chair", "stool", "bench", "table", "desk")
@@ -46,14 +46,14 @@ BACKWARDS = "turned by 180° about Y"
 
 
 @dataclass(frozen=True)
-class Figure:
+class KindResult:
     """One cloud that was checked. what: the row that it counts in; right: whether it is an object
     of the category, upright and facing +X; taken_for: what it looked like."""
 
     what: str
     name: str
     right: bool
-    doubted: bool
+    warned: bool
     taken_for: str
     probability: float
 
@@ -113,18 +113,18 @@ def evaluate_kind(
     right: list[tuple[str, str, np.ndarray]],
     others: list[Path],
     progress: Callable[[int, int], None] | None = None,
-) -> list[Figure]:
+) -> list[KindResult]:
     """Check objects of the category (source, name, points), as they are and turned, and others."""
-    figures: list[Figure] = []
+    results: list[KindResult] = []
     done, total = 0, len(right) + len(others)
     for source, name, points in right:
-        figures.append(_figure(source, name, True, _check(network, category, points)))
+        results.append(_result(source, name, True, _check(network, category, points)))
         for what, rotations in turns().items():
             for rotation in rotations:
                 said = _check(network, category, points @ rotation.T)
-                figures.append(_figure(what, name, False, said))
+                results.append(_result(what, name, False, said))
         said = _check(network, category, _beside(points, right[done - 1][2]))
-        figures.append(_figure(PAIRS, name, False, said))
+        results.append(_result(PAIRS, name, False, said))
         done += 1
         if progress is not None:
             progress(done, total)
@@ -135,58 +135,60 @@ def evaluate_kind(
             log.warning("left out: %s", error)
             continue
         said = _check(network, category, points)
-        figures.append(_figure(OTHERS, path.stem, False, said))
+        results.append(_result(OTHERS, path.stem, False, said))
         done += 1
         if progress is not None:
             progress(done, total)
-    return figures
+    return results
 
 
-def labelled_figures(network: KindNetwork, category: str, labelled: Path) -> Iterator[Figure]:
+def check_furniture(network: KindNetwork, category: str, labelled: Path) -> Iterator[KindResult]:
     """Furniture of other categories, of which some is sat on too: told apart, without a bar."""
     for kind in FURNITURE:
         if kind != category and (labelled / kind).is_dir():
             for mesh in read_objects(labelled, [kind]):
                 said = _check(network, category, _skin(mesh.key, mesh.vertices, mesh.faces))
-                yield _figure(f"labelled meshes: {kind}", mesh.key, False, said)
+                yield _result(f"labelled meshes: {kind}", mesh.key, False, said)
 
 
-def scan_figures(scorer: PoseScorer, shapes: Path, every: int) -> Iterator[Figure]:
+def check_scans(scorer: PoseScorer, shapes: Path, every: int) -> Iterator[KindResult]:
     """Simulated scans of three views of every so manieth test mesh, brought in by alignment."""
     for number, item in enumerate(scans.meshes(shapes, scorer.model.category)):
         if number % every:
             continue
         rng = np.random.default_rng([zlib.crc32(item.name.encode()), scans.KINDS[VIEWS]])
         pose = scans.random_pose(rng)
-        scan = scans.look(item, VIEWS, pose, rng)
+        scan = scans.scan_item(item, VIEWS, pose, rng)
         assert scan is not None
         found = clean_and_align(scorer, scan.cloud, scans.UP)
         right = scans.pose_error(found, pose)[0] < 5
         what = f"scans of {VIEWS}, aligned" + ("" if right else " wrongly")
-        yield _figure(what, item.name, right, found.kind)
+        yield _result(what, item.name, right, found.kind)
 
 
-def summary(figures: list[Figure]) -> list[tuple[str, int, int, str]]:
-    """Rows: what, how many of them were doubted, of how many, and the bar, if there is one."""
+def summary(results: list[KindResult]) -> list[tuple[str, int, int, str]]:
+    """Rows: what, how many of them were warned, of how many, and the bar, if there is one."""
     rows = []
     for right in (True, False):
-        chosen = [f for f in figures if f.right == right and not f.what.startswith("scans")]
+        chosen = [f for f in results if f.right == right and not f.what.startswith("scans")]
         names = list(dict.fromkeys(f.what for f in chosen))
         for name in names:
             mine = [f for f in chosen if f.what == name]
-            bar = f"≥ {DOUBTED:.0%}" if name in (OTHERS, BACKWARDS) else ""
-            rows.append((name, sum(f.doubted for f in mine), len(mine), bar))
+            bar = f"≥ {LEAST_WARNED:.0%}" if name in (OTHERS, BACKWARDS) else ""
+            rows.append((name, sum(f.warned for f in mine), len(mine), bar))
         if right:
-            doubted = sum(f.doubted for f in chosen)
-            rows.append(("all real objects of the kind", doubted, len(chosen), f"≤ {PASSED:.0%}"))
+            warned = sum(f.warned for f in chosen)
+            rows.append(
+                ("all real objects of the kind", warned, len(chosen), f"≤ {MOST_WARNED:.0%}")
+            )
         else:
             turned = [f for f in chosen if f.what in turns()]
-            doubted = sum(f.doubted for f in turned)
-            rows.append(("all turned objects", doubted, len(turned), f"≥ {DOUBTED:.0%}"))
-    for name in dict.fromkeys(f.what for f in figures if f.what.startswith("scans")):
-        mine = [f for f in figures if f.what == name]
-        bar = f"≤ {SCANS:.0%}" if mine[0].right else ""
-        rows.append((name, sum(f.doubted for f in mine), len(mine), bar))
+            warned = sum(f.warned for f in turned)
+            rows.append(("all turned objects", warned, len(turned), f"≥ {LEAST_WARNED:.0%}"))
+    for name in dict.fromkeys(f.what for f in results if f.what.startswith("scans")):
+        mine = [f for f in results if f.what == name]
+        bar = f"≤ {MOST_WARNED_SCANS:.0%}" if mine[0].right else ""
+        rows.append((name, sum(f.warned for f in mine), len(mine), bar))
     return rows
 
 
@@ -205,9 +207,9 @@ def _beside(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return np.concatenate([one, moved])
 
 
-def _figure(what: str, name: str, right: bool, said: KindCheck) -> Figure:
+def _result(what: str, name: str, right: bool, said: KindCheck) -> KindResult:
     sure = float("nan") if said.probability is None else said.probability
-    return Figure(what, name, right, not said.fits, said.taken_for, sure)
+    return KindResult(what, name, right, not said.fits, said.taken_for, sure)
 
 
 def _about(axis: np.ndarray, degrees: float) -> np.ndarray:

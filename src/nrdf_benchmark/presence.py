@@ -24,7 +24,7 @@ from nrdf.regions.presence import SURELY_ABSENT, Evidence
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.families import get_family
 from nrdf_benchmark.objects.pairs import ABSENT, THERE, part_iou, state_of
-from nrdf_benchmark.objects.retrieval import WHOLE, Finder
+from nrdf_benchmark.objects.retrieval import WHOLE, ObjectRetrieval
 from nrdf_benchmark.scans import score_regions
 
 FIRST_SEED = 1_000_000
@@ -61,7 +61,7 @@ _LARGEST = 1 << 26  # bytes of a file of examples
 
 
 @dataclass(frozen=True)
-class Rule:
+class PresenceRule:
     """Overlap to be expected of evidence: 1 / (1 + exp(-(bias + weights @ evidence)))."""
 
     bias: float
@@ -73,14 +73,16 @@ class Rule:
 
 
 def examples_of_objects(
-    finder: Finder, reference: str, target: str, views: Sequence[int] = VIEWS
+    retrieval: ObjectRetrieval, reference: str, target: str, views: Sequence[int] = VIEWS
 ) -> list[Example]:
     """Every part of one labelled object, sought on another, whole and in scans."""
-    regions, cloud = finder.regions(reference), finder.whole(reference).cloud
-    taught, found = finder.model.set_reference(cloud), []
+    regions, cloud = retrieval.regions(reference), retrieval.whole_cloud(reference).cloud
+    encoded_reference, found = retrieval.model.set_reference(cloud), []
     for number in views:
-        seen, truth = finder.seen(target, number), finder.truth(target)
-        for name, match in taught.retrieve_all(regions, seen.embedded, drop_absent=False).items():
+        seen, truth = retrieval.target_cloud(target, number), retrieval.truth(target)
+        for name, match in encoded_reference.retrieve_all(
+            regions, seen.encoded, drop_absent=False
+        ).items():
             state = state_of(name, truth, seen.labelled)
             if state not in (THERE, ABSENT):
                 continue
@@ -89,7 +91,7 @@ def examples_of_objects(
                 indices = seen.aligned.cleaned.kept[indices]
             overlap = 0.0
             if state == THERE:
-                overlap = part_iou(indices, name, finder.labels, seen.labelled)
+                overlap = part_iou(indices, name, retrieval.labels, seen.labelled)
             kind = {WHOLE: "whole", 1: "1 view"}.get(number, f"{number} views")
             evidence = match.presence.evidence or ()
             found.append(
@@ -103,20 +105,20 @@ def examples_of_objects(
 def examples_of_members(scorer: PoseScorer, pair: int) -> list[Example]:
     """Every region of one family member, sought on another, whole and in scans."""
     category = scorer.model.category
-    figures = score_regions(scorer, category, pair, FIRST_SEED, drop_absent=False)
+    results = score_regions(scorer, category, pair, FIRST_SEED, drop_absent=False)
     names = f"{category} {2 * pair}", f"{category} {2 * pair + 1}"
     return [
         Example(
             f"family {category}", f.kind, *names, f.region, 0.0 if f.state == "absent" else f.iou,
             f.state == "absent", f.evidence,
         )
-        for f in figures
+        for f in results
         if f.state in ("there", "absent") and f.evidence
     ]  # fmt: skip
 
 
-def kept(folder: Path, name: str, collect: Callable[[], list[Example]]) -> list[Example]:
-    """What `collect` gives, kept in the file `name`.json of a folder, and not measured again.
+def load_or_collect(folder: Path, name: str, collect: Callable[[], list[Example]]) -> list[Example]:
+    """What `collect` gives, cached in the file `name`.json of a folder, and not measured again.
 
     Raises OutputError if it cannot be written, DataError for a file that is damaged.
     """
@@ -138,18 +140,18 @@ def choose_pairs(category: str, count: int) -> list[int]:
     family = get_family(category)
     lacks = []
     for pair in range(_CHOICE * count):
-        taught, target = (
+        reference, target = (
             {*family.region_of(surface.coordinates)}
             for surface in (
                 family.member(FIRST_SEED + 2 * pair + i).sample_surface(1024, rng)
                 for i, rng in enumerate(map(np.random.default_rng, (0, 1)))
             )
         )
-        lacks.append(len(taught - target - {""}))
+        lacks.append(len(reference - target - {""}))
     return sorted(np.argsort(-np.array(lacks), kind="stable")[:count].tolist())
 
 
-def fit(examples: Sequence[Example]) -> Rule:
+def fit(examples: Sequence[Example]) -> PresenceRule:
     """The rule whose expected overlaps are likeliest, each source and kind counting alike.
 
     Raises DataError where no part is absent, or none is there.
@@ -170,7 +172,7 @@ def fit(examples: Sequence[Example]) -> Rule:
         return float(weight @ each + _RIDGE * rule[1:] @ rule[1:])
 
     bias, *weights = minimize(loss, np.zeros(columns.shape[1])).x
-    return Rule(float(bias), tuple(float(w) for w in weights))
+    return PresenceRule(float(bias), tuple(float(w) for w in weights))
 
 
 def cross_validate(examples: Sequence[Example]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Figures of finished pairs on disk, so that an interrupted evaluation goes on where it was."""
+"""Results of finished pairs on disk, so that an interrupted evaluation goes on where it was."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SOURCES = (
 class PairResult:
     """One method on one pair.
 
-    seconds: wall time of the call; points: how many were found, by region; figures: each metric
+    seconds: wall time of the call; points: how many were found, by region; metrics: each metric
     (`nrdf_benchmark.metrics.METRICS`) by region, None where it has no value; confidence: the
     method's own, by region, empty where it has none.
     """
@@ -47,7 +47,7 @@ class PairResult:
     target: str
     seconds: float
     points: dict[str, int]
-    figures: dict[str, dict[str, float | None]]
+    metrics: dict[str, dict[str, float | None]]
     confidence: dict[str, float]
 
 
@@ -71,7 +71,7 @@ class LineCache:
     def read(self, name: str, marks: Mapping[str, Key]) -> dict[Key, dict[str, Any]]:
         """What the file `name` has of the fingerprints in `marks`, by what they stand for there;
         other lines are taken out."""
-        path, kept = self.folder / name, {}
+        path, cached = self.folder / name, {}
         there = path.exists() and not self.overwrite
         text = read_file(path, OutputError, _LARGEST) if there else b""
         for line in text.decode("utf-8", "replace").splitlines():
@@ -81,10 +81,10 @@ class LineCache:
             except (ValueError, KeyError, TypeError, RecursionError):
                 continue  # cut off, or not ours
             if isinstance(mark, str) and mark in marks:
-                kept[marks[mark]] = content
+                cached[marks[mark]] = content
         if path.exists():
-            write_atomically(path, [f"{json.dumps(line)}\n".encode() for line in kept.values()])
-        return kept
+            write_atomically(path, [f"{json.dumps(line)}\n".encode() for line in cached.values()])
+        return cached
 
     def append(self, name: str, mark: str, content: Mapping[str, Any]) -> None:
         """Add a line."""
@@ -97,7 +97,7 @@ class PairCache(LineCache):
     """A folder of `pairs/<category>-<labels>-<method>.jsonl`, one line a pair.
 
     A line counts only if its fingerprint fits: of the method, its weights, the labels, both
-    objects' files, and the code that figures depend on.
+    objects' files, and the code that results depend on.
     """
 
     def open(self, benchmark: Benchmark, spec: MethodSpec) -> dict[tuple[str, str], PairResult]:
@@ -108,11 +108,11 @@ class PairCache(LineCache):
         }
         lines = self.read(_file(benchmark, spec), marks)
         parsed = {names: _parsed(line, benchmark.rois) for names, line in lines.items()}
-        kept = {names: result for names, result in parsed.items() if result is not None}
-        if kept:
-            count, total = len(kept), len(benchmark.pairs)
+        cached = {names: result for names, result in parsed.items() if result is not None}
+        if cached:
+            count, total = len(cached), len(benchmark.pairs)
             log.info("%s: %d of %d pairs were there already", spec.name, count, total)
-        return kept
+        return cached
 
     def add(self, benchmark: Benchmark, spec: MethodSpec, result: PairResult) -> None:
         """Append one pair."""
@@ -124,7 +124,7 @@ class PairCache(LineCache):
 def fingerprint(
     benchmark: Benchmark, spec: MethodSpec, reference: BenchmarkObject, target: BenchmarkObject
 ) -> str:
-    """What a pair's figures depend on, as 32 hexadecimal digits."""
+    """What a pair's results depend on, as 32 hexadecimal digits."""
     parts = [
         spec.name, spec.sha256, benchmark.category, benchmark.labels, reference.checksum,
         target.checksum, metrics.VERSION, code_checksum(),
@@ -137,7 +137,7 @@ def code_checksum(sources: tuple[str, ...] = SOURCES) -> str:
     """SHA-256 of the Python files in folders of code (or single files) that results depend on.
 
     Paths are relative to the folder that holds the packages. Raises FileNotFoundError for one
-    that is not there: results would be kept whatever becomes of that code.
+    that is not there: results would be cached whatever becomes of that code.
     """
     digest = hashlib.sha256()
     for source in sources:
@@ -155,14 +155,14 @@ def _file(benchmark: Benchmark, spec: MethodSpec) -> str:
 def _parsed(content: Mapping[str, Any], rois: tuple[str, ...]) -> PairResult | None:
     """A line's result; None for one that is not ours."""
     try:
-        figures = {
-            roi: {name: _number(content["figures"][roi][name]) for name in metrics.METRICS}
+        values = {
+            roi: {name: _number(content["metrics"][roi][name]) for name in metrics.METRICS}
             for roi in rois
         }
         points = {roi: int(content["points"][roi]) for roi in rois}
         names = str(content["reference"]), str(content["target"])
         confidence = {roi: _finite(value) for roi, value in content["confidence"].items()}
-        return PairResult(*names, _finite(content["seconds"]), points, figures, confidence)
+        return PairResult(*names, _finite(content["seconds"]), points, values, confidence)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError):
         return None
 
@@ -174,5 +174,5 @@ def _number(value: Any) -> float | None:
 def _finite(value: Any) -> float:
     number = float(value)
     if not math.isfinite(number):
-        raise ValueError("a figure that is no number")
+        raise ValueError("a metric that is no number")
     return number

@@ -1,7 +1,7 @@
 """Scans with known truth: how well poses are found, and regions on what was seen.
 
 Objects are members of the parametric families that training has not seen, and meshes where there
-are any; cameras are simulated (`nrdf.scans.simulate`). Definitions of the figures:
+are any; cameras are simulated (`nrdf.scans.simulate`). Definitions of the results:
 docs/evidence/scans.md.
 """
 
@@ -46,7 +46,7 @@ UP = up_axis("z")
 
 
 @dataclass(frozen=True)
-class Item:
+class KnownObject:
     """An object whose truth is known: vertices (v, 3) and faces (f, 3), canonical, and points
     (8192, 3) of its full surface."""
 
@@ -58,9 +58,9 @@ class Item:
 
 
 @dataclass(frozen=True)
-class PoseFigure:
+class PoseResult:
     """One scan's alignment. yaw: error in degrees, of the whole rotation; scale: relative error;
-    doubted: the report said that the pose is ambiguous, rough or a poor fit; seconds, processor
+    warned: the report said that the pose is ambiguous, rough or a poor fit; seconds, processor
     seconds: of cleaning and alignment; points: of the scan."""
 
     kind: str
@@ -68,14 +68,14 @@ class PoseFigure:
     name: str
     yaw: float
     scale: float
-    doubted: bool
+    warned: bool
     seconds: float
     processor_seconds: float
     points: int
 
 
 @dataclass(frozen=True)
-class RegionFigure:
+class RegionResult:
     """One region on one target. kind: "canonical", or one of `KINDS`; state: "there", "absent" or
     "hidden" in truth; reason: what was reported; cd_l1: canonical, of what was found from what is
     true and was seen, `MISSED` where nothing was found, NaN where there was nothing to find; iou:
@@ -92,17 +92,17 @@ class RegionFigure:
     evidence: tuple[float, ...]
 
 
-def members(category: str, count: int) -> Iterator[Item]:
+def members(category: str, count: int) -> Iterator[KnownObject]:
     """Unseen members of a family."""
     family = get_family(category)
     for seed in range(FIRST_SEED, FIRST_SEED + count):
         member = family.member(seed)
         mesh = tessellate(member)
         surface = member.sample_surface(CLOUD_POINTS, np.random.default_rng(seed))
-        yield Item(str(seed), "family", mesh.vertices, mesh.faces, surface.points)
+        yield KnownObject(str(seed), "family", mesh.vertices, mesh.faces, surface.points)
 
 
-def meshes(folder: Path, category: str, split: str = "test") -> Iterator[Item]:
+def meshes(folder: Path, category: str, split: str = "test") -> Iterator[KnownObject]:
     """The meshes of a split that `index.csv` in `folder` lists (category, shape, split).
 
     They lie in folder/category/shape.*; +X forward, +Y up. Raises DataError if the index or a mesh
@@ -127,7 +127,7 @@ def meshes(folder: Path, category: str, split: str = "test") -> Iterator[Item]:
         vertices = (vertices - centre) / scale
         rng = np.random.default_rng(zlib.crc32(name.encode()))
         skin = outer_skin(vertices, faces, CLOUD_POINTS, rng)[1]
-        yield Item(name, "mesh", vertices, faces, skin.points)
+        yield KnownObject(name, "mesh", vertices, faces, skin.points)
 
 
 def random_pose(rng: np.random.Generator) -> Similarity:
@@ -137,7 +137,9 @@ def random_pose(rng: np.random.Generator) -> Similarity:
     return Similarity(turn, scale * rng.uniform(-10, 10, 3), scale)
 
 
-def look(item: Item, kind: str, pose: Similarity, rng: np.random.Generator) -> SimulatedScan | None:
+def scan_item(
+    item: KnownObject, kind: str, pose: Similarity, rng: np.random.Generator
+) -> SimulatedScan | None:
     """A simulated scan of that kind, with a floor; None of the full surface."""
     views = KINDS[kind]
     if not views:
@@ -146,22 +148,30 @@ def look(item: Item, kind: str, pose: Similarity, rng: np.random.Generator) -> S
     return simulate_scan(item.vertices, item.faces, settings, rng, pose)
 
 
-def score_pose(scorer: PoseScorer, item: Item, kind: str) -> PoseFigure:
+def score_pose(scorer: PoseScorer, item: KnownObject, kind: str) -> PoseResult:
     """Scan an item, align it, and compare with the truth; its own random numbers."""
     rng = np.random.default_rng([zlib.crc32(item.name.encode()), KINDS[kind]])
     pose = random_pose(rng)
-    scan = look(item, kind, pose, rng)
+    scan = scan_item(item, kind, pose, rng)
     cloud = PointCloud(pose.to_scan(item.points)) if scan is None else scan.cloud
     start, processor = time.perf_counter(), time.process_time()
     found = clean_and_align(scorer, cloud, UP)
     seconds, processor = time.perf_counter() - start, time.process_time() - processor
     yaw, scale = pose_error(found, pose)
-    return PoseFigure(
-        kind, item.source, item.name, yaw, scale, is_doubted(found), seconds, processor, len(cloud)
+    return PoseResult(
+        kind,
+        item.source,
+        item.name,
+        yaw,
+        scale,
+        has_pose_warning(found),
+        seconds,
+        processor,
+        len(cloud),
     )
 
 
-def is_doubted(found: AlignedScan) -> bool:
+def has_pose_warning(found: AlignedScan) -> bool:
     """Whether the pose is reported as ambiguous, rough or a poor fit."""
     alignment = found.alignment
     return alignment.is_ambiguous or alignment.best.symmetry == 0 or not found.kind.fits
@@ -180,7 +190,7 @@ def score_regions(
     pair: int,
     first_seed: int = FIRST_SEED,
     drop_absent: bool = True,
-) -> list[RegionFigure]:
+) -> list[RegionResult]:
     """Every region of one member, found on another: canonical, and in scans of each kind.
 
     The members of pair i have the seeds first_seed + 2 i and the next. drop_absent: as of
@@ -193,7 +203,7 @@ def score_regions(
     taught_on = reference.sample_surface(CLOUD_POINTS, rng)
     surface = target.sample_surface(CLOUD_POINTS, rng)
     mesh = tessellate(target)
-    item = Item(str(pair), "family", mesh.vertices, mesh.faces, surface.points)
+    item = KnownObject(str(pair), "family", mesh.vertices, mesh.faces, surface.points)
     names, true = family.region_of(taught_on.coordinates), family.region_of(surface.coordinates)
     regions = {r: names == r for r in family.region_names if (names == r).sum() >= LEAST}
     share = {r: float((true == r).mean()) for r in regions}
@@ -203,10 +213,10 @@ def score_regions(
     encoded = scorer.model.encode(PointCloud(taught_on.points, taught_on.normals))
     taught = EncodedReference(scorer.model, encoded)
     matches = taught.retrieve_all(regions, PointCloud(surface.points), drop_absent=drop_absent)
-    figures = _compare("canonical", pair, matches, surface.points, true, share)
+    results = _compare("canonical", pair, matches, surface.points, true, share)
     for kind in KINDS:
         pose = random_pose(rng)
-        scan = look(item, kind, pose, rng)
+        scan = scan_item(item, kind, pose, rng)
         if scan is None:
             cloud, seen, shape = PointCloud(pose.to_scan(surface.points)), true, surface.points
         else:
@@ -215,8 +225,8 @@ def score_regions(
         found = clean_and_align(scorer, cloud, UP)
         matches = taught.retrieve_all(regions, found.encode(), drop_absent=drop_absent)
         matches = {name: match.in_scan(found) for name, match in matches.items()}
-        figures += _compare(kind, pair, matches, shape, seen, share)
-    return figures
+        results += _compare(kind, pair, matches, shape, seen, share)
+    return results
 
 
 def _labels(family: Family, mesh: Tessellation, scan: SimulatedScan) -> np.ndarray:
@@ -232,11 +242,11 @@ def _compare(
     points: np.ndarray,
     labels: np.ndarray,
     share: dict[str, float],
-) -> list[RegionFigure]:
+) -> list[RegionResult]:
     """Matches against the labels (n,) of points (n, 3), canonical; share: of each region in the
     full surface."""
     of_object = int((labels != "floor").sum())
-    figures = []
+    results = []
     for name, match in matches.items():
         true = points[labels == name]
         due = share[name] * of_object
@@ -257,14 +267,14 @@ def _compare(
             said = match.presence
             evidence = tuple(said.evidence or ())
             found_points = len(match.indices)
-            figures.append(
-                RegionFigure(kind, pair, name, state, said.reason, found_points, cd, iou, evidence)
+            results.append(
+                RegionResult(kind, pair, name, state, said.reason, found_points, cd, iou, evidence)
             )
-    return figures
+    return results
 
 
 def summary(
-    poses: list[PoseFigure], regions: list[RegionFigure]
+    poses: list[PoseResult], regions: list[RegionResult]
 ) -> list[tuple[str, str, float, int]]:
     """Rows: kind, what, value, of how many."""
     rows: list[tuple[str, str, float, int]] = []
@@ -279,8 +289,8 @@ def summary(
             add(kind, f"{source}: yaw within 5°", [p.yaw < 5 for p in mine])
             add(kind, f"{source}: scale within 2 %", [p.scale < 0.02 for p in mine])
         mine = [p for p in poses if p.kind == kind]
-        add(kind, "wrong poses that were doubted", [p.doubted for p in mine if p.yaw >= 5])
-        add(kind, "right poses that were doubted", [p.doubted for p in mine if p.yaw < 5])
+        add(kind, "wrong poses with a warning", [p.warned for p in mine if p.yaw >= 5])
+        add(kind, "right poses with a warning", [p.warned for p in mine if p.yaw < 5])
         add(kind, "seconds", [p.seconds for p in mine])
         add(kind, "seconds of processor time", [p.processor_seconds for p in mine])
     canonical = {(r.pair, r.region): r.cd_l1 for r in regions if r.kind == "canonical"}
@@ -303,15 +313,15 @@ def summary(
 
 def evaluate_scans(
     scorer: PoseScorer,
-    items: Callable[[], Iterator[Item]],
+    items: Callable[[], Iterator[KnownObject]],
     count: int,
     pairs: int,
     progress: Callable[[int, int], None],
-) -> tuple[list[PoseFigure], list[RegionFigure]]:
+) -> tuple[list[PoseResult], list[RegionResult]]:
     """Poses of `count` items in each kind of scan, and regions of `pairs` pairs of members."""
     total, done = count + pairs, 0
-    poses: list[PoseFigure] = []
-    regions: list[RegionFigure] = []
+    poses: list[PoseResult] = []
+    regions: list[RegionResult] = []
     for item in items():
         poses += [score_pose(scorer, item, kind) for kind in KINDS]
         progress(done := done + 1, total)

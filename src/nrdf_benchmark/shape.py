@@ -92,7 +92,7 @@ class ShapeResult:
 
 
 def level_set(
-    model: Model, embedded: EncodedCloud, settings: Settings
+    model: Model, encoded: EncodedCloud, settings: Settings
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Vertices (v, 3) in the cloud's frame and faces (f, 3) of the field's surface.
 
@@ -103,21 +103,21 @@ def level_set(
     axis = np.linspace(-EDGE, EDGE, count)
     z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")  # x runs fastest, as igl wants it
     nodes = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    value = logits(model, embedded, nodes)
+    value = logits(model, encoded, nodes)
     level = float(np.log(settings.level / (1 - settings.level)))
     vertices, faces, _ = igl.marching_cubes(value, nodes, count, count, count, level)
-    return (embedded.original(vertices), faces) if len(faces) else None
+    return (encoded.original(vertices), faces) if len(faces) else None
 
 
-def logits(model: Model, embedded: EncodedCloud, points_canonical: np.ndarray) -> np.ndarray:
-    """The occupancy's logits (m,) at canonical points (m, 3) of an embedded cloud."""
+def logits(model: Model, encoded: EncodedCloud, points_canonical: np.ndarray) -> np.ndarray:
+    """The occupancy's logits (m,) at canonical points (m, 3) of an encoded cloud."""
     parts = []
     with torch.inference_mode():
         for start in range(0, len(points_canonical), _CHUNK):
             queries = torch.as_tensor(
                 points_canonical[start : start + _CHUNK], dtype=torch.float32, device=model.device
             )
-            parts.append(model.field.occupancy(embedded.z, queries[None])[0].double().cpu().numpy())
+            parts.append(model.field.occupancy(encoded.z, queries[None])[0].double().cpu().numpy())
     return np.concatenate(parts)
 
 
@@ -133,11 +133,11 @@ def score_shape(model: Model, shape: Shape, settings: Settings) -> ShapeScore:
     cloud = shape.surface_points.astype(float)
     cloud = cloud[rng.permutation(len(cloud))[: settings.points]]
     sampling = chamfer_l1(cloud[::2], cloud[1::2])
-    embedded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
-    queries = embedded.canonical(shape.query_points.astype(float))
-    guess = 1 / (1 + np.exp(-np.clip(logits(model, embedded, queries), -50, 50)))
+    encoded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
+    queries = encoded.canonical(shape.query_points.astype(float))
+    guess = 1 / (1 + np.exp(-np.clip(logits(model, encoded, queries), -50, 50)))
     mse = float(np.mean((guess - shape.query_occupancies) ** 2))
-    surface = level_set(model, embedded, settings)
+    surface = level_set(model, encoded, settings)
     if surface is None:
         return ShapeScore(shape.name, MISSED, mse, True, sampling)
     mesh = trimesh.Trimesh(*surface, process=False)

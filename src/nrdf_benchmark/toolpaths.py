@@ -41,7 +41,7 @@ Exact = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Work:
+class PlanningObject:
     """An object to plan on. points: (n, 3), m; normals: (n, 3); regions: name to indices (k,);
     exact: the surface itself, where it is known."""
 
@@ -73,7 +73,7 @@ class PathResult:
         return self.width_m >= 2.0 * STRATEGY.tool_radius_m and self.bend_rad <= np.pi / 4
 
 
-def family_members(category: str, members: int) -> Iterator[Work]:
+def family_members(category: str, members: int) -> Iterator[PlanningObject]:
     """Members that no training set holds, with their exact regions, one cloud each."""
     if members < 1:
         raise DataError(f"{members} members asked for; give at least 1")
@@ -85,7 +85,7 @@ def family_members(category: str, members: int) -> Iterator[Work]:
         regions = {name: np.flatnonzero(named == name) for name in family.region_names}
         regions = {name: found for name, found in regions.items() if len(found) >= SMALLEST_REGION}
         exact = partial(_near_member, member)
-        yield Work(str(seed), SIZE_M * sample.points, sample.normals, regions, exact)
+        yield PlanningObject(str(seed), SIZE_M * sample.points, sample.normals, regions, exact)
 
 
 def _near_member(member: Member, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -95,16 +95,16 @@ def _near_member(member: Member, places: np.ndarray, normals: np.ndarray) -> np.
     return inside & ~outside
 
 
-def bsrc_objects(folder: Path, category: str) -> Iterator[Work]:
+def bsrc_objects(folder: Path, category: str) -> Iterator[PlanningObject]:
     """The benchmark's objects, with their regions as labelled."""
     for item in read_bsrc(folder, category, "corrected").objects:
         points = SIZE_M / canonical_transform(item.cloud.points)[1] * item.cloud.points
         assert item.cloud.normals is not None  # read_bsrc estimates them
-        yield Work(item.name, points, item.cloud.normals, item.truth)
+        yield PlanningObject(item.name, points, item.cloud.normals, item.truth)
 
 
 def evaluate_toolpaths(
-    objects: Iterable[Work],
+    objects: Iterable[PlanningObject],
     strategy: Strategy = STRATEGY,
     progress: Callable[[int], None] | None = None,
 ) -> list[PathResult]:
@@ -124,10 +124,10 @@ def evaluate_toolpaths(
             start = time.process_time()
             segments = plan(surface, region, strategy)
             seconds = shared + time.process_time() - start
-            figures = measure_path(surface, region, strategy, segments)
+            metrics = measure_path(surface, region, strategy, segments)
             width, bend = _shape(patches_of(surface, region))
             near = None if item.exact is None else _near(item.exact, segments, strategy)
-            results.append(PathResult(item.name, name, width, bend, figures, near, seconds))
+            results.append(PathResult(item.name, name, width, bend, metrics, near, seconds))
         if progress is not None:
             progress(number + 1)
     return results
@@ -153,8 +153,8 @@ def _near(exact: Exact, segments: Iterable[Segment], strategy: Strategy) -> floa
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A figure of all results: what it is, the bar in words, its values (n,), and which of them
+class PathMetric:
+    """A metric of all results: what it is, the bar in words, its values (n,), and which of them
     meet the bar (n,)."""
 
     name: str
@@ -168,14 +168,14 @@ class Figure:
         return float(self.values.min() if self.lowest_is_worst else self.values.max())
 
 
-def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Figure]:
-    """The figures that tool paths are held to, of those results that have them."""
+def summarize(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[PathMetric]:
+    """The metrics that tool paths are held to, of those results that have them."""
     made = [
-        _figure(
+        _metric(
             "coverage of what is not left out, %", ">= 99",
             [_covered(r.metrics) for r in results], 99.0, True,
         ),
-        _figure(
+        _metric(
             "worst line spacing, stepovers", "<= 1.15",
             [
                 r.metrics.line_spacing_worst_m / strategy.stepover_m
@@ -184,27 +184,27 @@ def figures(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[Fi
             ],
             1.15,
         ),
-        _figure(
+        _metric(
             "distance from smooth surface (99 %), mm", "<= 1",
             [1e3 * r.metrics.surface_distance_99_m for r in results], 1.0,
         ),
-        _figure(
+        _metric(
             "tool axis (99 %), degrees", "<= 5",
             [float(np.degrees(r.metrics.axis_error_99_rad)) for r in results], 5.0,
         ),
-        _figure(
+        _metric(
             "largest step between waypoints, spacings", "<= 2",
             [r.metrics.step_worst_m / strategy.spacing_m for r in results], 2.0,
         ),
-        _figure(
+        _metric(
             "largest turn between waypoints, degrees", "<= 30",
             [float(np.degrees(r.metrics.turn_worst_rad)) for r in results], 30.0,
         ),
     ]  # fmt: skip
     near = [100.0 * r.near for r in results if r.near is not None]
     if near:
-        made.append(_figure("within 1 mm of exact surface, %", "", near, 99.0, True))
-    return [figure for figure in made if len(figure.values)]
+        made.append(_metric("within 1 mm of exact surface, %", "", near, 99.0, True))
+    return [metric for metric in made if len(metric.values)]
 
 
 def _covered(metrics: ToolPathMetrics) -> float:
@@ -213,10 +213,10 @@ def _covered(metrics: ToolPathMetrics) -> float:
     return 100.0 * metrics.coverage / wanted if wanted > 0.0 else 0.0
 
 
-def _figure(
+def _metric(
     name: str, bar: str, values: list[float], limit: float, lowest_is_worst: bool = False
-) -> Figure:
+) -> PathMetric:
     found = np.array(values)
-    return Figure(
+    return PathMetric(
         name, bar, found, found >= limit if lowest_is_worst else found <= limit, lowest_is_worst
     )

@@ -27,7 +27,7 @@ from nrdf.shapes.families.member import Member
 from nrdf_benchmark.families import CLOUD_POINTS, FIRST_SEED
 
 SMALLEST_REGION = 60
-"""Points of the reference's cloud that a region needs to be taught."""
+"""Points of the reference's cloud that a region needs to get a raster."""
 _PRESENT = 20  # points of the target's cloud from which on it has a region
 _TRUTH_POINTS = 40_000
 _RASTER = {
@@ -84,10 +84,12 @@ def evaluate_warp(
         rng = np.random.default_rng(FIRST_SEED + number)
         here = reference.sample_surface(CLOUD_POINTS, rng)
         there = target.sample_surface(CLOUD_POINTS, rng)
-        teacher = ProcessTransfer(_lesson(category, family, here), model)
-        embedded = model.encode(PointCloud(there.points, there.normals))
-        way = Correspondence(teacher.reference_surface, embedded)
-        matches = teacher.reference.retrieve_all(teacher.bound_knowledge.regions, embedded)
+        process_transfer = ProcessTransfer(_raster_knowledge(category, family, here), model)
+        encoded = model.encode(PointCloud(there.points, there.normals))
+        correspondence = Correspondence(process_transfer.reference_surface, encoded)
+        matches = process_transfer.reference.retrieve_all(
+            process_transfer.bound_knowledge.regions, encoded
+        )
         named = family.region_of(there.coordinates)
         truth = _Truth(reference, target, rng)
         found = []
@@ -96,7 +98,7 @@ def evaluate_warp(
             confidence.append(matches[name].score)
             present.append(has >= _PRESENT)
             if has >= _PRESENT:
-                warped = _warped(teacher, way, name, truth)
+                warped = _warped(process_transfer, correspondence, name, truth)
                 if warped is not None:
                     found.append(warped[0])
                     counts += warped[1]
@@ -114,7 +116,7 @@ def evaluate_warp(
     )
 
 
-def _lesson(category: str, family: Family, surface: SurfaceSample) -> BoundKnowledge:
+def _raster_knowledge(category: str, family: Family, surface: SurfaceSample) -> BoundKnowledge:
     """A raster on every region of a reference that is large enough."""
     named = family.region_of(surface.coordinates)
     regions = {
@@ -132,7 +134,7 @@ def _lesson(category: str, family: Family, surface: SurfaceSample) -> BoundKnowl
 
 
 class _Truth:
-    """Where places of one member are on another: by the nearest of many exact pairs."""
+    """Where points of one member are on another: by the nearest of many exact pairs."""
 
     def __init__(self, reference: Member, target: Member, rng: np.random.Generator) -> None:
         dense = reference.sample_surface(_TRUTH_POINTS, rng)
@@ -140,29 +142,29 @@ class _Truth:
         self._points, self._there, self._exists = dense.points, located.points, located.exists
         self._tree = cKDTree(oriented_features(dense.points, dense.normals, NORMAL_WEIGHT))
 
-    def places(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The true places (m, 3) of points (m, 3) with normals (m, 3), and which exist (m,)."""
+    def positions(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The true positions (m, 3) of points (m, 3) with normals (m, 3), and which exist (m,)."""
         nearest = self._tree.query(oriented_features(points, normals, NORMAL_WEIGHT))[1]
         return self._there[nearest] + points - self._points[nearest], self._exists[nearest]
 
 
 def _warped(
-    teacher: ProcessTransfer, way: Correspondence, name: str, truth: _Truth
+    process_transfer: ProcessTransfer, correspondence: Correspondence, name: str, truth: _Truth
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Errors (w,) of one region's warped waypoints; and how many were lost of how many that
     exist, invented of how many that do not. None where no raster fits the region."""
     try:
-        lines = teacher.reference_segments(name, 0)
+        segments = process_transfer.reference_segments(name, 0)
     except ProcessError:
         return None
-    warped, _ = warp_segments(way, lines, _RASTER["tool"]["radius_m"])  # type: ignore[index]
+    warped, _ = warp_segments(correspondence, segments, _RASTER["tool"]["radius_m"])  # type: ignore[index]
     errors, counts = [], np.zeros(4)
-    arrived = [np.full((len(line.positions), 3), np.nan) for line in lines]
-    for line in warped:
-        arrived[line.line][line.source] = line.positions
-    for planned, there in zip(lines, arrived, strict=True):
+    arrived = [np.full((len(segment.positions), 3), np.nan) for segment in segments]
+    for segment in warped:
+        arrived[segment.line][segment.source] = segment.positions
+    for planned, there in zip(segments, arrived, strict=True):
         outward = -_tool_z(planned.quaternions_xyzw)
-        exact, exists = truth.places(planned.positions, outward)
+        exact, exists = truth.positions(planned.positions, outward)
         has = np.isfinite(there[:, 0])
         errors.append(np.linalg.norm(there - exact, axis=1)[has & exists])
         counts += [(exists & ~has).sum(), exists.sum(), (~exists & has).sum(), (~exists).sum()]

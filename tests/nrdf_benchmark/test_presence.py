@@ -62,7 +62,7 @@ def test_without_absent_parts_there_is_nothing_to_fit():
         presence.fit(there)
 
 
-def test_what_was_measured_is_kept(tmp_path):
+def test_what_was_measured_is_load_or_collect(tmp_path):
     asked = []
 
     def collect():
@@ -70,13 +70,13 @@ def test_what_was_measured_is_kept(tmp_path):
         return examples(3)
 
     folder = tmp_path / "new"
-    assert presence.kept(folder, "pair", collect) == examples(3)
-    assert presence.kept(folder, "pair", collect) == examples(3) and asked == [1]
+    assert presence.load_or_collect(folder, "pair", collect) == examples(3)
+    assert presence.load_or_collect(folder, "pair", collect) == examples(3) and asked == [1]
     whole = (folder / "pair.json").read_text()
     for damaged in ("[{", "[" * 100_000, '"x"', whole.replace('"absent": ', '"absent": 7'), "\0"):
         (folder / "pair.json").write_text(damaged)
         with pytest.raises(DataError, match=r"pair\.json is damaged .* delete it"):
-            presence.kept(folder, "pair", collect)
+            presence.load_or_collect(folder, "pair", collect)
 
 
 def test_pairs_whose_target_lacks_regions_come_first():

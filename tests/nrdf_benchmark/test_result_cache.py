@@ -28,17 +28,17 @@ def benchmark(tmp_path_factory):
 
 @pytest.fixture
 def folder(benchmark, tmp_path):
-    evaluate(benchmark, [SPEC], store=PairCache(tmp_path))
+    evaluate(benchmark, [SPEC], cache=PairCache(tmp_path))
     return tmp_path
 
 
 def test_what_was_added_is_there_again(benchmark, folder):
-    kept = PairCache(folder).open(benchmark, SPEC)
+    cached = PairCache(folder).open(benchmark, SPEC)
     (result,) = evaluate(benchmark, [SPEC])
     for pair in result.pairs:
-        found = kept.pop((pair.reference, pair.target))
-        assert (found.figures, found.points) == (pair.figures, pair.points)
-    assert not kept
+        found = cached.pop((pair.reference, pair.target))
+        assert (found.metrics, found.points) == (pair.metrics, pair.points)
+    assert not cached
 
 
 def test_pairs_of_objects_that_came_or_went_are_told_apart(benchmark, folder):
@@ -77,7 +77,7 @@ def test_lines_that_were_cut_off_or_are_not_ours_do_not_count(benchmark, folder)
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:3]) + "[1]\n{}\n" + lines[4][: len(lines[4]) // 2])
     assert len(PairCache(folder).open(benchmark, SPEC)) == 3
-    (result,) = evaluate(benchmark, [SPEC], store=PairCache(folder))
+    (result,) = evaluate(benchmark, [SPEC], cache=PairCache(folder))
     assert len(result.pairs) == 6 and len(path.read_text().splitlines()) == 6
 
 
@@ -98,7 +98,7 @@ def test_a_damaged_line_is_measured_again(benchmark, folder, change):
     assert damaged != lines[2]
     path.write_text("\n".join([*lines[:2], damaged, *lines[3:], ""]), encoding="latin-1")
     assert len(PairCache(folder).open(benchmark, SPEC)) == 5
-    (result,) = evaluate(benchmark, [SPEC], store=PairCache(folder))
+    (result,) = evaluate(benchmark, [SPEC], cache=PairCache(folder))
     assert len(result.pairs) == 6
 
 

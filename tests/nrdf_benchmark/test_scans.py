@@ -1,4 +1,4 @@
-"""The benchmark of scans: its truth, its figures, its command."""
+"""The benchmark of scans: its truth, its results, its command."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ def scorer():
 
 def test_poses_of_an_item_are_scored_the_same_every_time(scorer):
     (item,) = scans.members("car", 1)
-    figures = [scans.score_pose(scorer, item, kind) for kind in ("full", "3 views")]
-    assert [f.kind for f in figures] == ["full", "3 views"]
-    for figure in figures:
-        assert figure.yaw < 5 and figure.scale < 0.03 and figure.source == "family"
-        assert figure.seconds > 0 and figure.processor_seconds > 0
-    assert figures[0].points == scans.CLOUD_POINTS < figures[1].points
+    results = [scans.score_pose(scorer, item, kind) for kind in ("full", "3 views")]
+    assert [f.kind for f in results] == ["full", "3 views"]
+    for result in results:
+        assert result.yaw < 5 and result.scale < 0.03 and result.source == "family"
+        assert result.seconds > 0 and result.processor_seconds > 0
+    assert results[0].points == scans.CLOUD_POINTS < results[1].points
     again = scans.score_pose(scorer, item, "full")
-    assert (again.yaw, again.scale) == (figures[0].yaw, figures[0].scale)
+    assert (again.yaw, again.scale) == (results[0].yaw, results[0].scale)
 
 
 def test_regions_of_a_pair_are_scored_in_every_kind_of_scan(scorer):
-    figures = scans.score_regions(scorer, "car", 0)
-    assert {f.kind for f in figures} == {"canonical", *scans.KINDS}
-    there = [f for f in figures if f.state == "there"]
-    assert all(np.isnan(f.cd_l1) == (f.state != "there") for f in figures)
+    results = scans.score_regions(scorer, "car", 0)
+    assert {f.kind for f in results} == {"canonical", *scans.KINDS}
+    there = [f for f in results if f.state == "there"]
+    assert all(np.isnan(f.cd_l1) == (f.state != "there") for f in results)
     full = {f.region: f.cd_l1 for f in there if f.kind == "full"}
     canonical = {f.region: f.cd_l1 for f in there if f.kind == "canonical"}
     assert set(full) == set(canonical) and max(canonical.values()) < 0.2
@@ -54,14 +54,14 @@ def test_truth_is_there_absent_or_hidden():
     )
     found = Match(np.arange(400), points[:1], np.ones(400), "mask")
     matches = {"seat": found, "arm": nothing, "back": nothing, "leg": nothing}
-    figures = {f.region: f for f in scans._compare("1 view", 3, matches, points, labels, share)}
-    assert {name: f.state for name, f in figures.items()} == {
+    results = {f.region: f for f in scans._compare("1 view", 3, matches, points, labels, share)}
+    assert {name: f.state for name, f in results.items()} == {
         "seat": "there", "arm": "absent", "back": "hidden", "leg": "hidden"
     }  # fmt: skip
-    assert figures["seat"].cd_l1 == 0 and figures["arm"].reason == ABSENT
-    whole = [replace(figures["seat"], kind="canonical", region=r, cd_l1=c)
+    assert results["seat"].cd_l1 == 0 and results["arm"].reason == ABSENT
+    whole = [replace(results["seat"], kind="canonical", region=r, cd_l1=c)
              for r, c in (("seat", 0.02), ("back", 0.04))]  # fmt: skip
-    every = [*figures.values(), *whole]
+    every = [*results.values(), *whole]
     rows = {(kind, what): value for kind, what, value, _ in scans.summary([], every)}
     assert rows["canonical", "CD-L1"] == pytest.approx(0.03)
     assert rows["1 view", "CD-L1"] == 0 and rows["1 view", "the same regions canonical"] == 0.02
@@ -71,15 +71,15 @@ def test_truth_is_there_absent_or_hidden():
 
 
 def test_poses_are_summed_up_by_kind_and_source():
-    def figure(yaw, source, doubted):
-        return scans.PoseFigure("1 view", source, "", yaw, 0.01, doubted, 1.0, 1.0, 10)
+    def result(yaw, source, warned):
+        return scans.PoseResult("1 view", source, "", yaw, 0.01, warned, 1.0, 1.0, 10)
 
-    poses = [figure(1, "family", False), figure(179, "family", True), figure(2, "mesh", False)]
+    poses = [result(1, "family", False), result(179, "family", True), result(2, "mesh", False)]
     rows = {(kind, what): value for kind, what, value, _ in scans.summary(poses, [])}
     assert rows["1 view", "family: yaw within 5°"] == 0.5
     assert rows["1 view", "mesh: yaw within 5°"] == 1
-    assert rows["1 view", "wrong poses that were doubted"] == 1
-    assert rows["1 view", "right poses that were doubted"] == 0
+    assert rows["1 view", "wrong poses with a warning"] == 1
+    assert rows["1 view", "right poses with a warning"] == 0
 
 
 def test_the_command_scores_meshes_and_writes_every_figure(tmp_path, capsys):

@@ -89,10 +89,10 @@ def test_a_field_that_knows_is_as_close_as_another_sample(size):
 def test_the_surface_is_where_the_occupancy_is_the_level():
     shape = ellipsoid()
     model = Model(Ellipsoid(steep=5.0), {})
-    embedded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
+    encoded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
     for level in (0.75, 0.45):
-        vertices, faces = level_set(model, embedded, Settings(level, resolution=48))
-        canonical = embedded.canonical(vertices)
+        vertices, faces = level_set(model, encoded, Settings(level, resolution=48))
+        canonical = encoded.canonical(vertices)
         exact = 1 - np.log(level / (1 - level)) / 5.0
         np.testing.assert_allclose(np.linalg.norm(canonical / RADII, axis=1), exact, atol=0.01)
         edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -103,8 +103,8 @@ def test_figures_agree_with_brute_force():
     shape = ellipsoid(count=500)
     model = Model(Ellipsoid(steep=3.0, offset=0.7), {})
     found = score_shape(model, shape, Settings(points=300))
-    embedded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
-    queries = embedded.canonical(shape.query_points)
+    encoded = model.encode(PointCloud(shape.surface_points, shape.surface_normals))
+    queries = encoded.canonical(shape.query_points)
     guess = 1 / (1 + np.exp(-(3.0 * (1 - np.linalg.norm(queries / RADII, axis=1)) + 0.7)))
     assert found.mse == pytest.approx(np.mean((guess - shape.query_occupancies) ** 2), abs=1e-6)
     cloud = shape.surface_points[np.random.default_rng(0).permutation(500)[:300]]

@@ -15,17 +15,17 @@ from nrdf_benchmark.toolpaths import (
     NEAR_M,
     SIZE_M,
     STRATEGY,
-    Work,
+    PlanningObject,
     bsrc_objects,
     evaluate_toolpaths,
     family_members,
-    figures,
+    summarize,
 )
 
 
-def flat(name: str = "board", exact=None) -> Work:
+def flat(name: str = "board", exact=None) -> PlanningObject:
     points, normals = board()
-    return Work(name, points, normals, {"all": np.arange(len(points))}, exact)
+    return PlanningObject(name, points, normals, {"all": np.arange(len(points))}, exact)
 
 
 def test_the_figures_of_a_flat_board_meet_every_bar():
@@ -33,16 +33,16 @@ def test_the_figures_of_a_flat_board_meet_every_bar():
     (result,) = results
     assert result.wide and result.width_m == pytest.approx(0.3, abs=0.02)
     assert result.near == 1.0 and result.bend_rad < 1e-6
-    shown = {figure.name: figure for figure in figures(results)}
+    shown = {metric.name: metric for metric in summarize(results)}
     assert len(shown) == 7
-    assert all(figure.met.all() for figure in shown.values())
+    assert all(metric.met.all() for metric in shown.values())
     assert shown["coverage of what is not left out, %"].worst == pytest.approx(100.0, abs=1.0)
 
 
 def test_what_misses_a_bar_is_counted():
     wide = replace(STRATEGY, stepover_m=0.11)  # twice as far apart as the pad is wide
     results = evaluate_toolpaths([flat(), flat()], wide)
-    coverage = figures(results, wide)[0]
+    coverage = summarize(results, wide)[0]
     assert not coverage.met.any()
     assert coverage.worst == pytest.approx(50.0, abs=10.0)
 

@@ -27,7 +27,7 @@ from nrdf_benchmark.ablation.training import OMITTED, describe
 from nrdf_benchmark.bsrc.dataset import Benchmark
 from nrdf_benchmark.bsrc.evaluate import evaluate
 from nrdf_benchmark.families import CLOUD_POINTS, FIRST_SEED
-from nrdf_benchmark.methods.registry import Match, MethodSpec
+from nrdf_benchmark.methods.registry import Method, MethodSpec
 from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 from nrdf_benchmark.result_cache import PairCache
 
@@ -98,7 +98,7 @@ def family_cases(category: str, count: int) -> list[Case]:
 
 
 def score(
-    match: Match, cases: Sequence[Case], progress: Callable[[int, int], None] | None = None
+    match: Method, cases: Sequence[Case], progress: Callable[[int, int], None] | None = None
 ) -> dict[str, float]:
     """Mean CD-L1 (the paper's convention) of every region over the cases that have it.
 

@@ -13,14 +13,14 @@ import numpy as np
 from nrdf.errors import DataError, NrdfError
 from nrdf.shapes.pool import CRASHED, each
 from nrdf_benchmark.bsrc.dataset import Benchmark, BenchmarkObject
-from nrdf_benchmark.methods.registry import Match, MethodSpec, build_method
+from nrdf_benchmark.methods.registry import Method, MethodSpec, build_method
 from nrdf_benchmark.metrics import score
 from nrdf_benchmark.result_cache import PairCache, PairResult
 
 
 @dataclass(frozen=True)
 class MethodResult:
-    """One method's figures of every pair, in the order of the benchmark's pairs."""
+    """One method's results of every pair, in the order of the benchmark's pairs."""
 
     spec: MethodSpec
     rois: tuple[str, ...]
@@ -28,7 +28,7 @@ class MethodResult:
 
     def values(self, metric: str) -> np.ndarray:
         """(pairs, regions) of one metric; NaN where it has no value."""
-        rows = [[pair.figures[roi][metric] for roi in self.rois] for pair in self.pairs]
+        rows = [[pair.metrics[roi][metric] for roi in self.rois] for pair in self.pairs]
         return np.array(rows, dtype=float)
 
     def by_roi(self, metric: str) -> np.ndarray:
@@ -73,23 +73,23 @@ def evaluate(
     benchmark: Benchmark,
     specs: Sequence[MethodSpec],
     workers: int = 1,
-    store: PairCache | None = None,
+    cache: PairCache | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[MethodResult]:
     """Run methods on all ordered pairs, on `workers` processes of one thread each.
 
-    With one worker everything runs in this process. Pairs that `store` has are not run again, and
+    With one worker everything runs in this process. Pairs that `cache` has are not run again, and
     each one that is done is added to it. `progress` is told (method, pairs done, all). Raises
     whatever a method raises, and DataError if a process dies.
     """
     done: dict[tuple[str, str, str], PairResult] = {}
     tasks = []
     for spec in specs:
-        kept = store.open(benchmark, spec) if store else {}
+        cached = cache.open(benchmark, spec) if cache else {}
         for reference, target in benchmark.pairs:
             names = (reference.name, target.name)
-            if names in kept:
-                done[spec.name, reference.name, target.name] = kept[names]
+            if names in cached:
+                done[spec.name, reference.name, target.name] = cached[names]
             else:
                 tasks.append(_Task(spec, benchmark.category, reference, target))
     total = len(benchmark.pairs)
@@ -101,8 +101,8 @@ def evaluate(
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)
-            if store:
-                store.add(benchmark, task.spec, result)
+            if cache:
+                cache.add(benchmark, task.spec, result)
             done[task.spec.name, result.reference, result.target] = result
             counts[task.spec.name] += 1
             tell(task.spec.name, counts[task.spec.name], total)
@@ -118,16 +118,16 @@ def evaluate(
 
 
 def run_pair(
-    match: Match, category: str, reference: BenchmarkObject, target: BenchmarkObject
+    match: Method, category: str, reference: BenchmarkObject, target: BenchmarkObject
 ) -> PairResult:
     """Find a reference's regions on a target and score them. Timed is the one call of `match`."""
     start = time.perf_counter()
     found = match(reference.cloud, reference.regions, target.cloud)
     seconds = time.perf_counter() - start
-    figures = {roi: score(found[roi], target, roi, category) for roi in reference.regions}
+    metrics = {roi: score(found[roi], target, roi, category) for roi in reference.regions}
     points = {roi: len(found[roi]) for roi in reference.regions}
     confidence = dict(getattr(match, "confidence", {}))
-    return PairResult(reference.name, target.name, seconds, points, figures, confidence)
+    return PairResult(reference.name, target.name, seconds, points, metrics, confidence)
 
 
 def _run(task: _Task) -> PairResult:

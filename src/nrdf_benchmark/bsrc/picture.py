@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.viz.picture import Panel, add_legend, render_panels, write_figure
 from nrdf_benchmark.bsrc.dataset import Benchmark
-from nrdf_benchmark.methods.registry import Match
+from nrdf_benchmark.methods.registry import Method
 from nrdf_benchmark.metrics import chamfer_l1
 
 TARGETS = 4
@@ -19,7 +19,7 @@ _TEXT: dict[str, Any] = {"ha": "center", "family": "DejaVu Sans"}
 
 
 def draw_comparison(
-    benchmark: Benchmark, name: str, match: Match, path: Path, size: int = 300
+    benchmark: Benchmark, name: str, match: Method, path: Path, size: int = 300
 ) -> None:
     """Write a picture of the first object's regions, found by a method on the next `TARGETS`.
 

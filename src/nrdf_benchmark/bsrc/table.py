@@ -82,7 +82,7 @@ def cells(row: Row, metric: str) -> list[str]:
 
 
 def caption(benchmark: Benchmark, metric: str) -> tuple[str, str]:
-    """What the table is of, and what its figures are."""
+    """What the table is of, and what its metric is."""
     chosen = METRICS[metric]
     better = "higher" if chosen.higher_is_better else "lower"
     return (
@@ -109,8 +109,8 @@ def markdown(results: Sequence[MethodResult], benchmark: Benchmark, metric: str)
     lines += ["", *(f"- {text}" for text in confidence_lines(results))]
     lines += [
         "",
-        "Seconds a pair: median wall time of finding all regions on a target, the reference taught "
-        "before, each process with one thread. A region found nowhere counts as "
+        "Seconds a pair: median wall time of finding all regions on a target, the reference "
+        "encoded before, each process with one thread. A region found nowhere counts as "
         f"{metrics.MISSED:g} in distances and 0 in shares.",
     ]
     return "\n".join(lines) + "\n"
@@ -143,16 +143,16 @@ def to_csv(results: Sequence[MethodResult], benchmark: Benchmark) -> str:
                 sure = f"{pair.confidence[roi]:.6g}" if pair.confidence else ""
                 which += map(spreadsheet_text, (pair.reference, pair.target, roi))
                 which += [str(pair.points[roi]), sure]
-                values = (pair.figures[roi][name] for name in METRICS)
-                figures = ["" if value is None else f"{value:.9g}" for value in values]
-                writer.writerow([*which, *figures, f"{pair.seconds:.4f}"])
+                values = (pair.metrics[roi][name] for name in METRICS)
+                texts = ["" if value is None else f"{value:.9g}" for value in values]
+                writer.writerow([*which, *texts, f"{pair.seconds:.4f}"])
     return text.getvalue()
 
 
 def to_json(
     results: Sequence[MethodResult], benchmark: Benchmark, provenance: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Everything: every pair's figures, what they mean and where they come from."""
+    """Everything: every pair's metrics, what they mean and where they come from."""
     corrected = benchmark.labels == "corrected"
     applied = [c for c in CORRECTIONS if corrected and c.category == benchmark.category]
     return {

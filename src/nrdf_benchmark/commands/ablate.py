@@ -67,7 +67,7 @@ def ablate(
     from nrdf_benchmark.ablation import table as ablation_table
     from nrdf_benchmark.ablation import training as ablation
     from nrdf_benchmark.bsrc.dataset import read_bsrc
-    from nrdf_benchmark.methods.learned import FieldMatch
+    from nrdf_benchmark.methods.learned import FieldMethod
 
     out = out or Path("runs") / f"ablate-{category}"
     settings = load_config(config or ablation.SCHEDULES[schedule])
@@ -91,7 +91,7 @@ def ablate(
         model = nrdf.load_model(run, str(chosen))
         with progress_bar(ablation.describe(variant)) as progress:
             if bsrc is None:
-                regions = ablation_table.score(FieldMatch(model, "points"), cases, progress)
+                regions = ablation_table.score(FieldMethod(model, "points"), cases, progress)
             else:
                 regions = ablation_table.benchmark_scores(
                     benchmark, run, str(chosen), cores, lambda _, *counts: progress(*counts)

@@ -80,9 +80,9 @@ def bsrc(
     with errors.status("reading the benchmark"):
         benchmark = read_bsrc(data, category, labels)
     workers = workers or os.cpu_count() or 1
-    store = None if out is None else PairCache(out, overwrite)
+    cache = None if out is None else PairCache(out, overwrite)
     with progress_bars(method) as progress:
-        results = evaluate(benchmark, specs, workers, store, progress)
+        results = evaluate(benchmark, specs, workers, cache, progress)
     _show_table(results, benchmark, metric)
     if out is None:
         return

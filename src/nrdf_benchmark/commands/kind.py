@@ -20,7 +20,7 @@ def kind(
     network: str | None = None,
     out: Path | None = None,
 ) -> None:
-    """What the check of the kind of object doubts, and what it lets pass.
+    """What the check of the kind of object warns of, and what it lets pass.
 
     Real objects of the category, as they are and turned, and objects of other kinds; with
     --scans-every also simulated scans of three views, after alignment. Nothing of it was trained
@@ -56,24 +56,24 @@ def kind(
     right = list(benchmark.real_objects(category, shapes, bsrc, labelled))
     foreign = [] if others is None else benchmark.other_objects(others, category, count)
     with progress_bar("objects") as progress:
-        figures = benchmark.evaluate_kind(asked, category, right, foreign, progress)
+        results = benchmark.evaluate_kind(asked, category, right, foreign, progress)
     if labelled is not None:
-        figures += benchmark.labelled_figures(asked, category, labelled)
+        results += benchmark.check_furniture(asked, category, labelled)
     if scans_every and shapes is not None:
         model = nrdf.load_model(category)
         model.kind_network = asked
-        figures += benchmark.scan_figures(PoseScorer(model), shapes, scans_every)
-    rows = benchmark.summary(figures)
-    shown = table("", category, "doubted", "of", "share", "bar")
-    for what, doubted, of, bar in rows:
-        shown.add_row(what, str(doubted), str(of), f"{doubted / max(of, 1):.1%}", bar)
+        results += benchmark.check_scans(PoseScorer(model), shapes, scans_every)
+    rows = benchmark.summary(results)
+    shown = table("", category, "with a warning", "of", "share", "bar")
+    for what, warned, of, bar in rows:
+        shown.add_row(what, str(warned), str(of), f"{warned / max(of, 1):.1%}", bar)
     show(shown)
     if out is not None:
         write_json(out, {
             "command": command_line(),
             "versions": versions(),
             "network": metadata,
-            "summary": [dict(zip(("what", "doubted", "of", "bar"), r, strict=True)) for r in rows],
-            "clouds": [vars(figure) for figure in figures],
+            "summary": [dict(zip(("what", "warned", "of", "bar"), r, strict=True)) for r in rows],
+            "clouds": [vars(result) for result in results],
         })  # fmt: skip
         console.print(f"wrote {out}")

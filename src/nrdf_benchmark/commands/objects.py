@@ -72,7 +72,7 @@ def objects(
     from nrdf_benchmark.objects.evaluate import JOBS, evaluate_jobs, evaluate_objects, pairs_of
     from nrdf_benchmark.objects.pairs import draw_pairs, group_categories
     from nrdf_benchmark.objects.report import Report
-    from nrdf_benchmark.objects.retrieval import Settings, check_choice, finder
+    from nrdf_benchmark.objects.retrieval import Settings, check_choice, shared_retrieval
     from nrdf_benchmark.objects.table import cells, headings, rows_of, tables
     from nrdf_benchmark.result_cache import LineCache
 
@@ -82,7 +82,7 @@ def objects(
     specs = find_methods(method, trained, [str(path)], device=device)
     with errors.status("reading the objects"):
         found = read_objects(data, category)
-    groups = group_categories((item.listed.category for item in found), group)
+    groups = group_categories((item.entry.category for item in found), group)
     sets = {name: pairs_of(found, members) for name, members in groups.items()}
     if pairs is not None:
         sets = {name: draw_pairs(of, pairs) for name, of in sets.items()}
@@ -90,20 +90,20 @@ def objects(
     if not all_pairs:
         raise DataError(f"{data}: no two objects of a category; nothing can be compared")
     settings = Settings(data.resolve(), path.resolve(), points, normals, device)
-    kept = None if out is None else LineCache(out, overwrite)
+    cache = None if out is None else LineCache(out, overwrite)
     count = workers or os.cpu_count() or 1
     chosen = draw_pairs(all_pairs, jobs)
     with progress_bars([*method, *[JOBS] * bool(chosen)]) as progress:
-        figures = evaluate_objects(settings, found, all_pairs, specs, views, count, kept, progress)
-        done = evaluate_jobs(settings, found, chosen, count, kept, progress)
-    for title, parts, rows in tables(rows_of(figures, sets)):
+        results = evaluate_objects(settings, found, all_pairs, specs, views, count, cache, progress)
+        done = evaluate_jobs(settings, found, chosen, count, cache, progress)
+    for title, parts, rows in tables(rows_of(results, sets)):
         shown = table(title, "", *headings(parts))
         shown.padding = (0, 1, 0, 0)  # so that it fits into 80 columns
         shown.columns[0].no_wrap = True
         for row in rows:
             shown.add_row(row.method, *cells(row, parts, brief=True))
         show(shown)
-    report = Report(figures, sets, done)
+    report = Report(results, sets, done)
     for line in report.lines():
         console.print(line)
     if out is None:
@@ -127,7 +127,7 @@ def objects(
     }
     written = replace(report, origin=origin).write(out)
     drawn = next((spec for spec in specs if METHODS[spec.name].is_learned), specs[0])
-    mine = [f for f in figures if (f.method, f.views) == (drawn.name, views[0])]
+    mine = [f for f in results if (f.method, f.views) == (drawn.name, views[0])]
     with errors.status("drawing the worst pairs"):
-        draw_worst(finder(settings), drawn, mine, out / "worst")
+        draw_worst(shared_retrieval(settings), drawn, mine, out / "worst")
     console.print("wrote " + ", ".join(str(place) for place in (*written, out / "worst")))

@@ -10,7 +10,7 @@ from nrdf.commands.one_run import one_run_at
 
 if TYPE_CHECKING:
     from nrdf.scans.pose_scorer import PoseScorer
-    from nrdf_benchmark.objects.retrieval import Finder
+    from nrdf_benchmark.objects.retrieval import ObjectRetrieval
     from nrdf_benchmark.presence import Example
 
 
@@ -52,18 +52,20 @@ def presence(
         examples_of_members,
         examples_of_objects,
         fit,
-        kept,
+        load_or_collect,
         summary,
     )
 
     every: list[Example] = []
     if objects is not None:
-        finder, keys = _finder(objects, model, device)
+        retrieval, keys = _open_objects(objects, model, device)
         with progress_bar("parts of objects") as progress:
             chosen = [(key, other) for key in keys for other in keys if key != other][::OBJECT_STEP]
             for done, (key, other) in enumerate(chosen, 1):
                 name = f"{key}-{other}".replace("/", "_")
-                every += kept(out, name, partial(examples_of_objects, finder, key, other))
+                every += load_or_collect(
+                    out, name, partial(examples_of_objects, retrieval, key, other)
+                )
                 progress(done, len(chosen))
     for name in category:
         scorer = None
@@ -75,7 +77,7 @@ def presence(
                     scorer = scorer or _scorer(name, device)
                     return examples_of_members(scorer, pair)
 
-                every += kept(out, f"{name}-{pair:03d}", collect)
+                every += load_or_collect(out, f"{name}-{pair:03d}", collect)
                 progress(done, pairs)
     rule = fit(every)
     weights = ", ".join(f"{weight:.2f}" for weight in rule.weights)
@@ -93,13 +95,15 @@ def presence(
     console.print(f"correlation of expected and true overlap of what is there: {correlation:.2f}")
 
 
-def _finder(folder: Path, model: str, device: str) -> tuple[Finder, list[str]]:
+def _open_objects(folder: Path, model: str, device: str) -> tuple[ObjectRetrieval, list[str]]:
     from nrdf.field.zoo import find_weights
     from nrdf_benchmark.objects.dataset import read_objects
-    from nrdf_benchmark.objects.retrieval import Finder, Settings
+    from nrdf_benchmark.objects.retrieval import ObjectRetrieval, Settings
 
     settings = Settings(folder.resolve(), find_weights(model).resolve(), device=device)
-    return Finder(settings), [item.key for item in read_objects(folder, ("chair", "stool"))]
+    return ObjectRetrieval(settings), [
+        item.key for item in read_objects(folder, ("chair", "stool"))
+    ]
 
 
 def _scorer(name: str, device: str) -> PoseScorer:

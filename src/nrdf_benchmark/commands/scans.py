@@ -25,7 +25,7 @@ def scans(
 
     Full clouds, and simulated scans of three views and of one with a floor and 1 mm of noise on a
     0.9 m object, at any yaw, scale and offset. Poses of unseen members of the category's family,
-    and of meshes; regions on pairs of members. docs/evidence/scans.md defines the figures.
+    and of meshes; regions on pairs of members. docs/evidence/scans.md defines the results.
 
     Example: nrdf eval scans --category chair --meshes shapes/
 
@@ -38,7 +38,7 @@ def scans(
         every: Use every so manieth of the meshes.
         pairs: Pairs of members on which regions are found.
         device: cpu, cuda, cuda:N or auto.
-        out: JSON file to write, with every single figure.
+        out: JSON file to write, with every single result.
     """
     from itertools import chain, islice
 

@@ -26,7 +26,7 @@ def speed(
 ) -> None:
     """Measure speed and memory of retrieval, transfer and training.
 
-    8 regions on a target of 8192 points without normals, the reference embedded before; transfer
+    8 regions on a target of 8192 points without normals, the reference encoded before; transfer
     with the chairs' model. Every other measurement runs in a process of its own.
 
     Example: nrdf eval speed --out speed.json

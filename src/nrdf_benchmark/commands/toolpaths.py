@@ -40,7 +40,7 @@ def toolpaths(
         bsrc_objects,
         evaluate_toolpaths,
         family_members,
-        figures,
+        summarize,
     )
 
     strategy = replace(STRATEGY, trajectory=trajectory, edge_margin_m=edge_margin_mm / 1e3)
@@ -56,10 +56,10 @@ def toolpaths(
         ):
             title = f"\n{category}, {source}, {trajectory}: {what}, {len(chosen)}"
             shown = table(title, "", "bar", "met by", "median", "worst")
-            for figure in figures(chosen, strategy):
-                cells = (np.median(figure.values), figure.worst)
-                met = f"{figure.met.mean():.0%}" if figure.bar else ""
-                shown.add_row(figure.name, figure.bar, met, *(f"{cell:.2f}" for cell in cells))
+            for metric in summarize(chosen, strategy):
+                cells = (np.median(metric.values), metric.worst)
+                met = f"{metric.met.mean():.0%}" if metric.bar else ""
+                shown.add_row(metric.name, metric.bar, met, *(f"{cell:.2f}" for cell in cells))
             show(shown)
         seconds = 8.0 * float(np.mean([r.seconds for r in results]))
         console.print(f"planning takes {seconds:.2f} s of CPU time for 8 regions")

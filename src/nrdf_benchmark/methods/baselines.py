@@ -27,7 +27,7 @@ _CAMERA = 10.0  # canonical distance of the viewpoints from the object's middle
 _SPHERE = 1e4  # radius of the sphere that points are flipped at, in farthest distances from it
 
 
-class Copied:
+class SnappedCopy:
     """Nothing learned, nothing moved but, with `box`, the bounding box.
 
     Each point of a region is snapped to the nearest target point; with `normals` to the nearest in
@@ -60,7 +60,7 @@ class Copied:
         return _hidden_point_normals(cloud.points.tobytes())
 
 
-class Boxed:
+class BoundingBoxMask:
     """The reference in the target's bounding box, which takes the regions as masks: each target
     point is in a region if most of the reference's points nearest to it are, in position and
     normal."""
@@ -72,7 +72,7 @@ class Boxed:
         return _voted(reference, regions, _in_box(own, points), normals, points, target_normals)
 
 
-class Registered:
+class RegistrationMask:
     """Registration of the reference to the target, which takes the regions as masks.
 
     `nrdf.shapes.registration` moves a subset of the reference, with the defaults by which it

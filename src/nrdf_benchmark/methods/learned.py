@@ -15,19 +15,19 @@ from nrdf.regions.model import Model
 from nrdf.regions.reference import EncodedReference
 
 
-class FieldMatch:
+class FieldMethod:
     """A field with an inverse: ours of either preset, or IMDC's.
 
     association: "mask", or "points": C's prediction of each region point, snapped to the nearest
     target point by position alone (paper, eq. 9). refine: move the mapped reference onto the target
-    in a few steps first. The last reference stays taught, as in use: a
-    target is embedded in every call.
+    in a few steps first. The last reference stays encoded, as in use; a target is encoded in
+    every call.
     """
 
     def __init__(self, model: Model, association: str, refine: bool = False) -> None:
         self.model, self.association, self.refine = model, association, refine
         self.confidence: dict[str, float] = {}
-        self._taught: EncodedReference | None = None
+        self._reference: EncodedReference | None = None
 
     def __call__(
         self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud
@@ -43,6 +43,6 @@ class FieldMatch:
         self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud | EncodedCloud
     ) -> dict[str, Match]:
         """All that retrieval says of each region."""
-        if self._taught is None or self._taught.reference.cloud is not reference:
-            self._taught = self.model.set_reference(reference)
-        return self._taught.retrieve_all(regions, target, self.association, self.refine)
+        if self._reference is None or self._reference.reference.cloud is not reference:
+            self._reference = self.model.set_reference(reference)
+        return self._reference.retrieve_all(regions, target, self.association, self.refine)

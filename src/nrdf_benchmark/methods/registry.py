@@ -23,7 +23,7 @@ from nrdf.errors import ConfigError, ModelError, unknown_name
 from nrdf.io.cloud import PointCloud
 
 Found = dict[str, np.ndarray]
-Match = Callable[[PointCloud, Mapping[str, Any], PointCloud], Found]
+Method = Callable[[PointCloud, Mapping[str, Any], PointCloud], Found]
 
 
 @dataclass(frozen=True)
@@ -94,22 +94,22 @@ def find_methods(
     return [_find_method(name, category, chosen, runs, device) for name in names]
 
 
-def build_method(spec: MethodSpec) -> Match:
+def build_method(spec: MethodSpec) -> Method:
     """The method that a spec describes; the last two are kept. Raises as reading weights does."""
     return _build(spec)
 
 
 @lru_cache(maxsize=2)
-def _build(spec: MethodSpec) -> Match:
-    from nrdf_benchmark.methods.baselines import Boxed, Copied, Registered
+def _build(spec: MethodSpec) -> Method:
+    from nrdf_benchmark.methods.baselines import BoundingBoxMask, RegistrationMask, SnappedCopy
 
     entry = METHODS[spec.name]
     if not entry.is_learned:
         if spec.name == "registration":
-            return Registered()
+            return RegistrationMask()
         if spec.name == "box-mask":
-            return Boxed()
-        return Copied(box=spec.name.startswith("box"), normals=spec.name.endswith("normals"))
+            return BoundingBoxMask()
+        return SnappedCopy(box=spec.name.startswith("box"), normals=spec.name.endswith("normals"))
     import nrdf
 
     model = nrdf.load_model(str(spec.weights), spec.device)
@@ -117,10 +117,10 @@ def _build(spec: MethodSpec) -> Match:
         from nrdf_benchmark.methods.ndf_search import DescriptorSearch
 
         return DescriptorSearch(model, energy=spec.name == "ndf-energy").match
-    from nrdf_benchmark.methods.learned import FieldMatch
+    from nrdf_benchmark.methods.learned import FieldMethod
 
     association = "mask" if spec.name in ("nrdf", "nrdf-refined") else "points"
-    return FieldMatch(model, association, refine=spec.name == "nrdf-refined")
+    return FieldMethod(model, association, refine=spec.name == "nrdf-refined")
 
 
 def _chosen_models(models: Sequence[str]) -> dict[str, str]:

@@ -51,7 +51,7 @@ class Labels:
 
 
 @dataclass(frozen=True)
-class Listed:
+class ObjectEntry:
     """A line of `index.csv`. forward_sure: whether it is known which side is the front: "no" in the
     column of that name says that it is not."""
 
@@ -71,7 +71,7 @@ class LabelledMesh:
     `nrdf.geometry.mesh.clean_mesh`; label (f,) name of each face's part; checksum: SHA-256 of its
     file."""
 
-    listed: Listed
+    entry: ObjectEntry
     vertices: np.ndarray
     faces: np.ndarray
     label: np.ndarray
@@ -79,8 +79,8 @@ class LabelledMesh:
 
     @property
     def key(self) -> str:
-        """As `Listed.key`."""
-        return self.listed.key
+        """As `ObjectEntry.key`."""
+        return self.entry.key
 
 
 def read_labels(folder: Path) -> Labels:
@@ -109,7 +109,7 @@ def read_labels(folder: Path) -> Labels:
     return Labels(names, ignored, background)
 
 
-def list_objects(folder: Path) -> list[Listed]:
+def list_objects(folder: Path) -> list[ObjectEntry]:
     """The objects that `index.csv` lists.
 
     Raises DataError if the file is missing, lacks a column, names an object twice or none, or a
@@ -120,7 +120,7 @@ def list_objects(folder: Path) -> list[Listed]:
         rows = list(csv.DictReader(_read_text(path).splitlines()))
     except csv.Error as error:
         raise DataError(f"{path}: no table with commas ({error})") from None
-    found: dict[str, Listed] = {}
+    found: dict[str, ObjectEntry] = {}
     for row in rows:
         category, name = row.get("category") or "", row.get("name") or ""
         if not (_WORD.fullmatch(category) and _WORD.fullmatch(name)):
@@ -128,7 +128,7 @@ def list_objects(folder: Path) -> list[Listed]:
                 f"{path}: '{category}', '{name}' is no category and name; the columns category and "
                 "name must hold plain words: letters, digits, '_', '-' and '.'"
             )
-        item = Listed(category, name, (row.get("forward_sure") or "").strip() != "no")
+        item = ObjectEntry(category, name, (row.get("forward_sure") or "").strip() != "no")
         if item.key in found:
             raise DataError(f"{path}: lists {category}, {name} twice")
         found[item.key] = item
@@ -137,14 +137,14 @@ def list_objects(folder: Path) -> list[Listed]:
     return list(found.values())
 
 
-def read_object(folder: Path, listed: Listed, labels: Labels) -> LabelledMesh:
+def read_object(folder: Path, entry: ObjectEntry, labels: Labels) -> LabelledMesh:
     """One object, canonical: its centre at 0, its longest side 1.
 
     Raises DataError if its file is missing, damaged, too large, or a face's label has no name.
     """
-    path = folder / listed.category / f"{listed.name}.npz"
+    path = folder / entry.category / f"{entry.name}.npz"
     if not path.is_file():
-        raise DataError(f"{folder}: {INDEX} lists {listed.key}, but there is no {path}")
+        raise DataError(f"{folder}: {INDEX} lists {entry.key}, but there is no {path}")
     with open_arrays(path, DataError) as arrays:
         fine = "face_label_fine" in arrays.names
         vertices = _load(arrays, "vertices", 3, "f")
@@ -165,7 +165,7 @@ def read_object(folder: Path, listed: Listed, labels: Labels) -> LabelledMesh:
         raise DataError(f"{path}: {error}") from None
     centre, scale = canonical_transform(vertices)
     names = np.array([labels.names[i] for i in number[kept].tolist()])
-    return LabelledMesh(listed, (vertices - centre) / scale, faces, names, digest)
+    return LabelledMesh(entry, (vertices - centre) / scale, faces, names, digest)
 
 
 def read_objects(folder: Path, categories: Sequence[str] = ()) -> list[LabelledMesh]:
@@ -173,12 +173,12 @@ def read_objects(folder: Path, categories: Sequence[str] = ()) -> list[LabelledM
 
     Raises DataError as the readers above do, and for a category of which there is none.
     """
-    labels, listed = read_labels(folder), list_objects(folder)
-    known = list(dict.fromkeys(item.category for item in listed))
+    labels, entry = read_labels(folder), list_objects(folder)
+    known = list(dict.fromkeys(item.category for item in entry))
     for category in categories:
         if category not in known:
             raise DataError(f"{folder}: {unknown_name('category', category, known)}")
-    chosen = [item for item in listed if item.category in categories or not categories]
+    chosen = [item for item in entry if item.category in categories or not categories]
     return [read_object(folder, item, labels) for item in chosen]
 
 

@@ -15,19 +15,19 @@ from nrdf.errors import DataError, NrdfError
 from nrdf.shapes.pool import CRASHED, each
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh
-from nrdf_benchmark.objects.jobs import JobFigure, run_job
+from nrdf_benchmark.objects.jobs import JobResult, run_job
 from nrdf_benchmark.objects.retrieval import (
     WHOLE,
-    PairFigure,
-    PartFigure,
+    ObjectPairResult,
+    PartResult,
     Pose,
     Settings,
-    finder,
+    shared_retrieval,
 )
 from nrdf_benchmark.result_cache import SOURCES, LineCache, code_checksum
 
 log = logging.getLogger(__name__)
-Figure = TypeVar("Figure", PairFigure, JobFigure)
+Result = TypeVar("Result", ObjectPairResult, JobResult)
 Progress = Callable[[str, int, int], None]
 
 JOBS = "jobs"
@@ -65,7 +65,7 @@ class _Task:
 
 def pairs_of(objects: Sequence[LabelledMesh], categories: Sequence[str]) -> list[tuple[str, str]]:
     """All ordered pairs of different objects of some categories, as keys."""
-    keys = [item.key for item in objects if item.listed.category in categories]
+    keys = [item.key for item in objects if item.entry.category in categories]
     return [(reference, target) for reference in keys for target in keys if reference != target]
 
 
@@ -76,18 +76,18 @@ def evaluate_objects(
     specs: Sequence[MethodSpec],
     views: Sequence[int] = (WHOLE,),
     workers: int = 1,
-    kept: LineCache | None = None,
+    cache: LineCache | None = None,
     progress: Progress | None = None,
-) -> list[PairFigure]:
+) -> list[ObjectPairResult]:
     """Run methods on pairs of objects, whole and in scans, on `workers` processes of one thread.
 
-    Pairs that `kept` has are not run again, and each one that is done is added to it. `progress` is
+    Pairs that `cache` has are not run again; each one that is done is added to it. `progress` is
     told (method, done, all). Raises whatever a method raises, and DataError if a process dies.
     """
     tasks = [
         _Task(settings, *pair, spec, number) for spec in specs for number in views for pair in pairs
     ]
-    return _resumed(tasks, _run, _pair, _SOURCES, objects, workers, kept, progress)
+    return _resumed(tasks, _run, _parse_pair, _SOURCES, objects, workers, cache, progress)
 
 
 def evaluate_jobs(
@@ -95,33 +95,33 @@ def evaluate_jobs(
     objects: Sequence[LabelledMesh],
     pairs: Sequence[tuple[str, str]],
     workers: int = 1,
-    kept: LineCache | None = None,
+    cache: LineCache | None = None,
     progress: Progress | None = None,
-) -> list[JobFigure]:
+) -> list[JobResult]:
     """Every pair from a file to robot programs; all else as of `evaluate_objects`."""
     tasks = [_Task(settings, *pair) for pair in pairs]
-    return _resumed(tasks, _run_job, _job, _JOB_SOURCES, objects, workers, kept, progress)
+    return _resumed(tasks, _run_job, _parse_job, _JOB_SOURCES, objects, workers, cache, progress)
 
 
 def _resumed(
     tasks: Sequence[_Task],
-    work: Callable[[_Task], Figure],
-    parse: Callable[[dict[str, Any]], Figure | None],
+    run: Callable[[_Task], Result],
+    parse: Callable[[dict[str, Any]], Result | None],
     sources: tuple[str, ...],
     objects: Sequence[LabelledMesh],
     workers: int,
-    kept: LineCache | None,
+    cache: LineCache | None,
     progress: Progress | None,
-) -> list[Figure]:
-    """What `work` gives of each task, or what is kept of it."""
+) -> list[Result]:
+    """What `run` gives of each task, or what the cache has of it."""
     tell = progress or (lambda *_: None)
     checksums = {item.key: item.checksum for item in objects}
     marks = {task: _fingerprint(task, checksums, sources) for task in tasks}
-    done: dict[_Task, Figure] = {}
+    done: dict[_Task, Result] = {}
     for file in dict.fromkeys(task.file for task in tasks):
         wanted = {marks[task]: task for task in tasks if task.file == file}
-        lines = kept.read(file, wanted) if kept else {}
-        done |= {task: figure for task, line in lines.items() if (figure := parse(line))}
+        lines = cache.read(file, wanted) if cache else {}
+        done |= {task: read for task, line in lines.items() if (read := parse(line))}
     totals, counts = (
         {name: sum(task.name == name for task in of) for name in {task.name for task in tasks}}
         for of in (tasks, done)
@@ -131,29 +131,29 @@ def _resumed(
             log.info("%s: %d of %d pairs were there already", name, count, totals[name])
         tell(name, count, totals[name])
     todo = [task for task in tasks if task not in done]
-    with closing(each(work, todo, min(workers, len(todo)))) as results:
+    with closing(each(run, todo, min(workers, len(todo)))) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)
-            if kept:
-                kept.append(task.file, marks[task], asdict(result))
+            if cache:
+                cache.append(task.file, marks[task], asdict(result))
             done[task] = result
             counts[task.name] += 1
             tell(task.name, counts[task.name], totals[task.name])
     return [done[task] for task in tasks]
 
 
-def _run(task: _Task) -> PairFigure:
+def _run(task: _Task) -> ObjectPairResult:
     assert task.spec is not None
-    return finder(task.settings).run(task.spec, task.views, task.reference, task.target)
+    return shared_retrieval(task.settings).run(task.spec, task.views, task.reference, task.target)
 
 
-def _run_job(task: _Task) -> JobFigure:
+def _run_job(task: _Task) -> JobResult:
     return run_job(task.settings, task.reference, task.target)
 
 
 def _fingerprint(task: _Task, checksums: Mapping[str, str], sources: tuple[str, ...]) -> str:
-    """What a pair's figures depend on, as 32 hexadecimal digits."""
+    """What a pair's results depend on, as 32 hexadecimal digits."""
     settings = task.settings
     parts = [
         task.name, task.spec and task.spec.sha256, _digest(settings), settings.points,
@@ -170,24 +170,24 @@ def _digest(settings: Settings) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
-def _pair(content: dict[str, Any]) -> PairFigure | None:
-    """A line's figures; None for one that is not ours."""
+def _parse_pair(content: dict[str, Any]) -> ObjectPairResult | None:
+    """A line's results; None for one that is not ours."""
     content.pop("fingerprint", None)
     try:
-        figure = PairFigure(**content)
+        result = ObjectPairResult(**content)
         parts = tuple(
-            PartFigure(**{**part, "evidence": tuple(part["evidence"])}) for part in content["parts"]
+            PartResult(**{**part, "evidence": tuple(part["evidence"])}) for part in content["parts"]
         )
-        pose = None if figure.pose is None else Pose(**content["pose"])
-        return replace(figure, parts=parts, mixed=tuple(content["mixed"]), pose=pose)
+        pose = None if result.pose is None else Pose(**content["pose"])
+        return replace(result, parts=parts, mixed=tuple(content["mixed"]), pose=pose)
     except (TypeError, KeyError, ValueError):
         return None
 
 
-def _job(content: dict[str, Any]) -> JobFigure | None:
+def _parse_job(content: dict[str, Any]) -> JobResult | None:
     content.pop("fingerprint", None)
     try:
-        return replace(JobFigure(**content), reasons=tuple(content["reasons"]))
+        return replace(JobResult(**content), reasons=tuple(content["reasons"]))
     except (TypeError, KeyError):
         return None
 

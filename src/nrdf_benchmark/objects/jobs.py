@@ -29,7 +29,7 @@ from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
 from nrdf.reports.job_folder import write_job
 from nrdf.toolpath.file import read_toolpaths
-from nrdf_benchmark.objects.retrieval import Finder, Settings, finder
+from nrdf_benchmark.objects.retrieval import ObjectRetrieval, Settings, shared_retrieval
 
 SIZE_M = 0.9
 """Longest side of the objects."""
@@ -39,10 +39,10 @@ _TARGET, _JOB, _PROGRAMS = "target.ply", "job", "programs"
 
 
 @dataclass(frozen=True)
-class JobFigure:
+class JobResult:
     """One pair. ended: no step failed, and there is a program with at least one tool path;
     complete: so did every part that the reference and the target have. reasons: what failed, and
-    for each of those parts why it has no path. crashed: what failed was no error of ours.
+    for each of those parts why it has no path. crashed: what failed was no `NrdfError`.
     seconds: by step; memory_bytes: largest resident size of the process meanwhile, None where the
     system does not tell."""
 
@@ -57,9 +57,9 @@ class JobFigure:
     memory_bytes: int | None
 
 
-def run_job(settings: Settings, reference: str, target: str) -> JobFigure:
+def run_job(settings: Settings, reference: str, target: str) -> JobResult:
     """Write the target's file, transfer to it, write the job and two programs of it."""
-    known = finder(settings)
+    retrieval = shared_retrieval(settings)
     seconds: dict[str, float] = {}
     step, reasons, crashed, paths = "", [], False, 0
 
@@ -75,15 +75,15 @@ def run_job(settings: Settings, reference: str, target: str) -> JobFigure:
         folder = Path(place)
         try:
             with timed("reference"):
-                teacher = _teacher(settings, reference)
+                process_transfer = _process_transfer(settings, reference)
             with timed("target file"):
-                mesh = known.mesh(target)
+                mesh = retrieval.mesh(target)
                 scaled = trimesh.Trimesh(SIZE_M * mesh.vertices, mesh.faces, process=False)
                 write_atomically(folder / _TARGET, [export_ply(scaled)])
                 cloud = read_cloud(folder / _TARGET)
             with timed("transfer"):
-                done = teacher.transfer(cloud, "m")
-            reasons = _missing(done, known, target)
+                done = process_transfer.transfer(cloud, "m")
+            reasons = _missing(done, retrieval, target)
             with timed("job folder"):
                 write_job(folder / _JOB, done, target)
             with timed("programs"):
@@ -97,54 +97,54 @@ def run_job(settings: Settings, reference: str, target: str) -> JobFigure:
             text = f"{type(error).__name__}: {error}" if crashed else str(error)
             reasons.append(f"{step}: {text.replace(place, '')}")
             paths = 0
-    return JobFigure(
+    return JobResult(
         reference, target, bool(paths), bool(paths) and not reasons, tuple(reasons), crashed,
         paths, seconds, _peak(),
     )  # fmt: skip
 
 
-def jobs_lines(jobs: Sequence[JobFigure]) -> list[str]:
-    """What is said of jobs: how many ended well, what failed, time and memory."""
+def describe_jobs(jobs: Sequence[JobResult]) -> list[str]:
+    """Jobs in words: how many ended well, what failed, time and memory."""
     if not jobs:
         return []
     ended, complete = (sum(getattr(job, name) for job in jobs) for name in ("ended", "complete"))
     total = [sum(job.seconds.values()) for job in jobs]
     memory = [job.memory_bytes for job in jobs if job.memory_bytes is not None]
-    said = (
+    summary = (
         f"from file to robot programs ({' and '.join(FORMATS)}): {ended} of {len(jobs)} pairs "
         f"ended well, {complete} with a tool path on every part that both have; "
         f"{np.median(total):.1f} s a pair (median; {max(total):.1f} at most)"
     )
     if memory:
-        said += f", {max(memory) / 1e9:.2f} GB at most"
+        summary += f", {max(memory) / 1e9:.2f} GB at most"
     failed = [job for job in jobs if not job.ended]
-    return [said, *(f"{job.reference} to {job.target}: {job.reasons[-1]}" for job in failed)]
+    return [summary, *(f"{job.reference} to {job.target}: {job.reasons[-1]}" for job in failed)]
 
 
 @lru_cache(maxsize=1)
-def _teacher(settings: Settings, reference: str) -> ProcessTransfer:
-    known = finder(settings)
-    whole = known.whole(reference).cloud
+def _process_transfer(settings: Settings, reference: str) -> ProcessTransfer:
+    retrieval = shared_retrieval(settings)
+    whole = retrieval.whole_cloud(reference).cloud
     cloud = PointCloud(SIZE_M * whole.points, whole.normals, unit="m")
     process = {"kind": PROCESS, **DEFAULTS[PROCESS]}  # type: ignore[index]
-    regions = known.regions(reference)
+    regions = retrieval.regions(reference)
     rows = [
         {"name": name, "indices": indices.tolist(), "processes": [process]}
         for name, indices in regions.items()
     ]
     content = {
-        "category": known.model.category,
+        "category": retrieval.model.category,
         "reference": {"cloud": "reference.ply", "unit": "m"},
         "regions": rows,
     }
     return ProcessTransfer(
-        BoundKnowledge(validated(content, reference), cloud, regions), known.model
+        BoundKnowledge(validated(content, reference), cloud, regions), retrieval.model
     )
 
 
-def _missing(done: TransferResult, known: Finder, target: str) -> list[str]:
+def _missing(done: TransferResult, retrieval: ObjectRetrieval, target: str) -> list[str]:
     """Why parts that the target has got no tool path."""
-    there = known.truth(target).parts
+    there = retrieval.truth(target).parts
     return [
         f"{step.region}: {step.reason}"
         for step in done.paths

@@ -11,58 +11,63 @@ from nrdf.viz.picture import Panel, draw_regions
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.objects.dataset import Labels
 from nrdf_benchmark.objects.pairs import THERE
-from nrdf_benchmark.objects.retrieval import Finder, PairFigure
+from nrdf_benchmark.objects.retrieval import ObjectPairResult, ObjectRetrieval
 from nrdf_benchmark.objects.sampling import FLOOR, LabelledCloud
 
 WORST = 10
 
 
-def worst_pairs(figures: Sequence[PairFigure], count: int = WORST) -> list[PairFigure]:
+def worst_pairs(results: Sequence[ObjectPairResult], count: int = WORST) -> list[ObjectPairResult]:
     """The pairs of least mean part IoU, the worst first, of equal ones those with most parts; those
     without a part in common are left out."""
-    known = [(figure, found) for figure in figures if (found := _found(figure))]
+    known = [(result, found) for result in results if (found := _found(result))]
     known.sort(key=lambda item: (np.mean(item[1]), -len(item[1])))
-    return [figure for figure, _ in known[:count]]
+    return [result for result, _ in known[:count]]
 
 
-def draw_pair(finder: Finder, spec: MethodSpec, figure: PairFigure, path: Path) -> None:
+def draw_pair(
+    retrieval: ObjectRetrieval, spec: MethodSpec, result: ObjectPairResult, path: Path
+) -> None:
     """The reference with its labels, and the target with what a method found and with its own.
 
     Pieces that count nowhere are drawn in a colour of their own. Raises OutputError.
     """
-    found = finder.find(spec, figure.views, figure.reference, figure.target)[0]
-    whole, seen = finder.whole(figure.reference), finder.seen(figure.target, figure.views).labelled
-    parts = {part.part: part for part in figure.parts}
+    found = retrieval.find(spec, result.views, result.reference, result.target)[0]
+    whole, seen = (
+        retrieval.whole_cloud(result.reference),
+        retrieval.target_cloud(result.target, result.views).labelled,
+    )
+    parts = {part.part: part for part in result.parts}
     said = []
     for name, part in parts.items():
         text = part.reason or ("" if part.found else "nowhere")
         value = (part.state or "not counted") if part.iou is None else f"{part.iou:.2f}"
         said.append(f"{name} {value}" + f" ({text})" * bool(text))
-    own = _true(finder.labels, whole)
-    drawn = {name: own[name] for name in (*parts, *finder.labels.ignored) if name in own}
+    own = _true(retrieval.labels, whole)
+    drawn = {name: own[name] for name in (*parts, *retrieval.labels.ignored) if name in own}
     panels = [
-        _panel(f"taught: {figure.reference}", whole, drawn),
-        _panel(f"found: {figure.target}", seen, found, ", ".join(said)),
-        _panel(f"true: {figure.target}", seen, _true(finder.labels, seen)),
+        _panel(f"reference: {result.reference}", whole, drawn),
+        _panel(f"found: {result.target}", seen, found, ", ".join(said)),
+        _panel(f"true: {result.target}", seen, _true(retrieval.labels, seen)),
     ]
     draw_regions(panels, path)
 
 
 def draw_worst(
-    finder: Finder, spec: MethodSpec, figures: Sequence[PairFigure], folder: Path
+    retrieval: ObjectRetrieval, spec: MethodSpec, results: Sequence[ObjectPairResult], folder: Path
 ) -> list[Path]:
     """A picture of each of the worst pairs, in a folder that is made; their paths."""
     folder.mkdir(exist_ok=True)
     paths = []
-    for number, figure in enumerate(worst_pairs(figures), 1):
-        names = f"{figure.reference}-to-{figure.target}".replace("/", "_")
+    for number, result in enumerate(worst_pairs(results), 1):
+        names = f"{result.reference}-to-{result.target}".replace("/", "_")
         paths.append(folder / f"{number:02d}-{names}.png")
-        draw_pair(finder, spec, figure, paths[-1])
+        draw_pair(retrieval, spec, result, paths[-1])
     return paths
 
 
-def _found(figure: PairFigure) -> list[float]:
-    return [part.iou or 0.0 for part in figure.parts if part.state == THERE]
+def _found(result: ObjectPairResult) -> list[float]:
+    return [part.iou or 0.0 for part in result.parts if part.state == THERE]
 
 
 def _true(labels: Labels, seen: LabelledCloud) -> dict[str, np.ndarray]:

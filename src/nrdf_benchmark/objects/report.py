@@ -13,9 +13,9 @@ import numpy as np
 from nrdf.io.atomic import write_atomically
 from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf_benchmark.methods.registry import METHODS
-from nrdf_benchmark.objects.jobs import JobFigure, jobs_lines
+from nrdf_benchmark.objects.jobs import JobResult, describe_jobs
 from nrdf_benchmark.objects.pairs import LEAST_SHARE
-from nrdf_benchmark.objects.retrieval import PairFigure
+from nrdf_benchmark.objects.retrieval import ObjectPairResult
 from nrdf_benchmark.objects.table import (
     Difference,
     Pairs,
@@ -38,13 +38,13 @@ STEM = "objects"
 class Report:
     """Figures of every method and pair, the sets of pairs that they are summed up by, and jobs."""
 
-    figures: Sequence[PairFigure]
+    results: Sequence[ObjectPairResult]
     sets: Mapping[str, Pairs]
-    jobs: Sequence[JobFigure] = ()
+    jobs: Sequence[JobResult] = ()
     origin: Mapping[str, Any] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
-        """What is said below the tables: differences with their intervals, poses, jobs."""
+        """Lines below the tables: differences with their intervals, poses, jobs."""
         said = []
         for difference in self.differences:
             said.append(
@@ -56,31 +56,31 @@ class Report:
             text = f"{_where(poses)}: "
             if poses.right.of:
                 text += f"poses within 5°: {poses.right}; "
-            if poses.doubted.of:
-                text += f"wrong ones that were doubted: {poses.doubted}; "
+            if poses.warned.of:
+                text += f"wrong ones with a warning: {poses.warned}; "
             said.append(f"{text}scale {poses.scale:.1%} off, {poses.seconds:.1f} s (medians)")
-        return [*said, *jobs_lines(self.jobs)]
+        return [*said, *describe_jobs(self.jobs)]
 
     @property
     def differences(self) -> list[Difference]:
         """Of `nrdf` and `registration`, for each set and view where both were run."""
-        found = [difference_of(select(self.figures, self.sets[r.set]), r) for r in self._firsts]
+        found = [difference_of(select(self.results, self.sets[r.set]), r) for r in self._firsts]
         return [difference for difference in found if difference is not None]
 
     @property
     def poses(self) -> list[Poses]:
         """Of scans, for each set and view."""
-        found = [poses_of(select(self.figures, self.sets[r.set]), r) for r in self._firsts]
+        found = [poses_of(select(self.results, self.sets[r.set]), r) for r in self._firsts]
         return [poses for poses in found if poses is not None]
 
     @property
     def _firsts(self) -> list:
-        return [rows[0] for _, _, rows in tables(rows_of(self.figures, self.sets))]
+        return [rows[0] for _, _, rows in tables(rows_of(self.results, self.sets))]
 
     def markdown(self) -> str:
-        """The tables, what is said below them, and what the columns are."""
+        """The tables, the lines below them, and what the columns are."""
         lines = ["# Parts of real objects, each shown once", ""]
-        for title, parts, rows in tables(rows_of(self.figures, self.sets)):
+        for title, parts, rows in tables(rows_of(self.results, self.sets)):
             lines += [f"## {title}", "", _line(["", *headings(parts)])]
             lines.append("|---" * (len(headings(parts)) + 1) + "|")
             for row in rows:
@@ -88,12 +88,12 @@ class Report:
                 lines.append(_line([name, *cells(row, parts)]))
             lines.append("")
         lines += [f"- {text}" for text in self.lines()]
-        lines += ["", *EXPLAINED]
+        lines += ["", *EXPLANATION]
         return "\n".join(lines) + "\n"
 
     def to_json(self) -> dict[str, Any]:
         """Everything."""
-        rows = [asdict(row) for row in rows_of(self.figures, self.sets)]
+        rows = [asdict(row) for row in rows_of(self.results, self.sets)]
         for row in rows:
             row["iou"] = {part: {"mean": m, "pairs": n} for part, (m, n) in row["iou"].items()}
             row |= {key: None for key in ("mean", "plain") if np.isnan(row[key])}
@@ -107,7 +107,7 @@ class Report:
             "differences": [asdict(difference) for difference in self.differences],
             "poses": [asdict(poses) for poses in self.poses],
             "jobs": [asdict(job) for job in self.jobs],
-            "pairs": [asdict(figure) for figure in self.figures],
+            "pairs": [asdict(result) for result in self.results],
         }
 
     def write(self, folder: Path) -> list[Path]:
@@ -117,7 +117,7 @@ class Report:
         """
         texts = {
             ".md": self.markdown(),
-            ".csv": to_csv(self.figures),
+            ".csv": to_csv(self.results),
             ".json": json.dumps(self.to_json(), indent=1, ensure_ascii=False) + "\n",
         }
         paths = []
@@ -127,7 +127,7 @@ class Report:
         return paths
 
 
-EXPLAINED = (
+EXPLANATION = (
     "Columns of parts: intersection over union of the points found and the points that carry the "
     "label, mean over the ordered pairs of which both have the part; a part returned empty counts "
     "as 0. Points of the target's pieces that serve two functions (`mixed`) are left out.",

@@ -1,6 +1,6 @@
 """Methods on labelled objects: parts of a reference found on a target, whole or in a scan.
 
-A `Finder` keeps what is known of each object, so that a pair costs what the pair alone needs.
+`ObjectRetrieval` reads, samples, scans and encodes each object only once for all its pairs.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
 from nrdf.scans.pose_scorer import PoseScorer
-from nrdf_benchmark.methods.learned import FieldMatch
+from nrdf_benchmark.methods.learned import FieldMethod
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method
 from nrdf_benchmark.objects.dataset import (
     LabelledMesh,
@@ -32,7 +32,7 @@ from nrdf_benchmark.objects.dataset import (
 )
 from nrdf_benchmark.objects.pairs import THERE, Truth, part_iou, parts_of, state_of, truth_of
 from nrdf_benchmark.objects.sampling import LabelledCloud, sample_object, scan_object
-from nrdf_benchmark.scans import UP, is_doubted, pose_error
+from nrdf_benchmark.scans import UP, has_pose_warning, pose_error
 
 WHOLE = 0
 """Views of the whole cloud, in its own frame; otherwise the number of cameras of a scan."""
@@ -40,7 +40,7 @@ WHOLE = 0
 
 @dataclass(frozen=True)
 class Settings:
-    """All that a process needs to know. model: the weight file of the model that aligns."""
+    """All that a process needs to begin. model: the weight file of the model that aligns."""
 
     folder: Path
     model: Path
@@ -53,21 +53,21 @@ class Settings:
 class Pose:
     """How well the target's scan was aligned: degrees of the whole rotation, None where it is not
     known which side of the target is the front; relative error of the scale; whether the report
-    doubted the pose; seconds."""
+    warns of the pose; seconds."""
 
     degrees: float | None
     scale: float
-    doubted: bool
+    warned: bool
     seconds: float
 
 
 @dataclass(frozen=True)
-class PartFigure:
+class PartResult:
     """One part of the reference on the target.
 
     state: in truth (`nrdf_benchmark.objects.pairs.state_of`). true, found: points. iou: None unless
     the part is there. Of a method that tells absence: reason ("" where it was found), score (mean
-    confidence), and presence, what that was judged by: confidence, observed share, evidence.
+    confidence), and what absence was told from: confidence of presence, observed share, evidence.
     """
 
     part: str
@@ -83,9 +83,9 @@ class PartFigure:
 
 
 @dataclass(frozen=True)
-class PairFigure:
+class ObjectPairResult:
     """One method on one pair. views: `WHOLE`, or cameras of the target's scan; seconds: of finding
-    all parts, target and reference embedded before; mixed: share of the reference's and of the
+    all parts, target and reference encoded before; mixed: share of the reference's and of the
     target's surface that counts nowhere; pose: of a scan."""
 
     method: str
@@ -93,40 +93,40 @@ class PairFigure:
     reference: str
     target: str
     seconds: float
-    parts: tuple[PartFigure, ...]
+    parts: tuple[PartResult, ...]
     mixed: tuple[float, float]
     pose: Pose | None = None
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A target as methods get it: points with labels, and the same as the field sees them."""
+class TargetCloud:
+    """A target as methods get it: points with labels, and the same encoded."""
 
     labelled: LabelledCloud
-    embedded: EncodedCloud
+    encoded: EncodedCloud
     canonical: PointCloud
     pose: Pose | None = None
     aligned: AlignedScan | None = None
 
     def in_cloud(self, found: np.ndarray) -> np.ndarray:
         """Indices of `canonical` as those of all points of the cloud."""
-        chosen = np.zeros(len(self.embedded.points), bool)
+        chosen = np.zeros(len(self.encoded.points), bool)
         chosen[found] = True
-        indices = self.embedded.to_all(chosen)[0]
+        indices = self.encoded.to_all(chosen)[0]
         return indices if self.aligned is None else self.aligned.cleaned.kept[indices]
 
 
-class Finder:
-    """Labelled objects of a folder, each read, sampled, scanned and embedded at most once."""
+class ObjectRetrieval:
+    """Labelled objects of a folder, each read, sampled, scanned and encoded at most once."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.labels: Labels = read_labels(settings.folder)
         self._listed = {item.key: item for item in list_objects(settings.folder)}
         self.mesh: Callable[[str], LabelledMesh] = lru_cache(None)(self._mesh)
-        self.whole: Callable[[str], LabelledCloud] = lru_cache(None)(self._whole)
+        self.whole_cloud: Callable[[str], LabelledCloud] = lru_cache(None)(self._whole_cloud)
         self.truth: Callable[[str], Truth] = lru_cache(None)(self._truth)
-        self.seen: Callable[[str, int], Seen] = lru_cache(None)(self._seen)
+        self.target_cloud: Callable[[str, int], TargetCloud] = lru_cache(None)(self._target_cloud)
 
     @cached_property
     def model(self) -> Model:
@@ -138,88 +138,88 @@ class Finder:
 
     def regions(self, key: str) -> dict[str, np.ndarray]:
         """The parts of an object that are large enough: name to indices of its whole cloud."""
-        return parts_of(self.labels, self.whole(key))
+        return parts_of(self.labels, self.whole_cloud(key))
 
     def find(
         self, spec: MethodSpec, views: int, reference: str, target: str
     ) -> tuple[dict[str, np.ndarray], dict[str, Match], float]:
         """All parts of a reference on a target by one method: name to indices (k,) of the target's
-        cloud; what a method that tells absence says of each; seconds."""
-        regions, seen = self.regions(reference), self.seen(target, views)
-        match, cloud = build_method(spec), self.whole(reference).cloud
+        cloud; what a method that tells absence returned of each; seconds."""
+        regions, target_cloud = self.regions(reference), self.target_cloud(target, views)
+        match, cloud = build_method(spec), self.whole_cloud(reference).cloud
         matches: dict[str, Match] = {}
         start = time.perf_counter()
-        if isinstance(match, FieldMatch):
-            matches = match.find(cloud, regions, seen.embedded)
-            if seen.aligned is not None:
-                matches = {name: m.in_scan(seen.aligned) for name, m in matches.items()}
+        if isinstance(match, FieldMethod):
+            matches = match.find(cloud, regions, target_cloud.encoded)
+            if target_cloud.aligned is not None:
+                matches = {name: m.in_scan(target_cloud.aligned) for name, m in matches.items()}
             found = {name: m.indices for name, m in matches.items()}
         else:
-            found = match(cloud, regions, seen.canonical)
-            found = {name: seen.in_cloud(indices) for name, indices in found.items()}
+            found = match(cloud, regions, target_cloud.canonical)
+            found = {name: target_cloud.in_cloud(indices) for name, indices in found.items()}
         return found, matches, time.perf_counter() - start
 
-    def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> PairFigure:
+    def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> ObjectPairResult:
         """Find all parts of a reference on a target by one method, and score them."""
         found, matches, seconds = self.find(spec, views, reference, target)
-        seen, truth = self.seen(target, views), self.truth(target)
+        target_cloud, truth = self.target_cloud(target, views), self.truth(target)
         parts = []
         for name, indices in found.items():
-            state = state_of(name, truth, seen.labelled)
-            true = int((seen.labelled.label == name).sum())
+            state = state_of(name, truth, target_cloud.labelled)
+            true = int((target_cloud.labelled.label == name).sum())
             iou = None
             if state == THERE:
-                iou = part_iou(indices, name, self.labels, seen.labelled)
-            figure = PartFigure(name, state, true, len(indices), iou)
+                iou = part_iou(indices, name, self.labels, target_cloud.labelled)
+            result = PartResult(name, state, true, len(indices), iou)
             if name in matches:
-                judged = matches[name].presence
-                figure = replace(
-                    figure,
-                    reason=judged.reason,
+                presence = matches[name].presence
+                result = replace(
+                    result,
+                    reason=presence.reason,
                     score=matches[name].score,
-                    confidence=judged.confidence,
-                    observed=judged.observed,
-                    evidence=tuple(judged.evidence or ()),
+                    confidence=presence.confidence,
+                    observed=presence.observed,
+                    evidence=tuple(presence.evidence or ()),
                 )
-            parts.append(figure)
+            parts.append(result)
         mixed = self.truth(reference).mixed, truth.mixed
-        return PairFigure(
-            spec.name, views, reference, target, seconds, tuple(parts), mixed, seen.pose
+        return ObjectPairResult(
+            spec.name, views, reference, target, seconds, tuple(parts), mixed, target_cloud.pose
         )
 
     def _mesh(self, key: str) -> LabelledMesh:
         return read_object(self.settings.folder, self._listed[key], self.labels)
 
-    def _whole(self, key: str) -> LabelledCloud:
+    def _whole_cloud(self, key: str) -> LabelledCloud:
         return sample_object(self.mesh(key), self.settings.points, self.settings.normals)
 
     def _truth(self, key: str) -> Truth:
-        return truth_of(self.labels, self.mesh(key), self.whole(key))
+        return truth_of(self.labels, self.mesh(key), self.whole_cloud(key))
 
-    def _seen(self, key: str, views: int) -> Seen:
+    def _target_cloud(self, key: str, views: int) -> TargetCloud:
         if views == WHOLE:
-            labelled = self.whole(key)
-            embedded = self.model.encode(labelled.cloud)
-            return Seen(labelled, embedded, PointCloud(embedded.points, embedded.normals))
+            labelled = self.whole_cloud(key)
+            encoded = self.model.encode(labelled.cloud)
+            return TargetCloud(labelled, encoded, PointCloud(encoded.points, encoded.normals))
         labelled = scan_object(self.mesh(key), views)
         start = time.perf_counter()
         aligned = clean_and_align(self.scorer, labelled.cloud, UP)
         seconds = time.perf_counter() - start
         degrees, scale = pose_error(aligned, labelled.pose)
-        sure, embedded = self._listed[key].forward_sure, aligned.encode()
-        return Seen(
+        sure, encoded = self._listed[key].forward_sure, aligned.encode()
+        return TargetCloud(
             labelled,
-            embedded,
-            PointCloud(embedded.points, embedded.normals),
-            Pose(degrees if sure else None, scale, is_doubted(aligned), seconds),
+            encoded,
+            PointCloud(encoded.points, encoded.normals),
+            Pose(degrees if sure else None, scale, has_pose_warning(aligned), seconds),
             aligned,
         )
 
 
 @lru_cache(maxsize=1)
-def finder(settings: Settings) -> Finder:
-    """The one of this process."""
-    return Finder(settings)
+def shared_retrieval(settings: Settings) -> ObjectRetrieval:
+    """The one that the tasks of this process share."""
+    return ObjectRetrieval(settings)
 
 
 def check_choice(methods: Sequence[str], views: Sequence[int]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from nrdf.io.file_names import spreadsheet_text
 from nrdf.process.transfer_result import MIN_CONFIDENCE
 from nrdf_benchmark.objects.pairs import ABSENT, HIDDEN, LEAST_SHARE, THERE
-from nrdf_benchmark.objects.retrieval import PairFigure, PartFigure, Pose
+from nrdf_benchmark.objects.retrieval import ObjectPairResult, PartResult, Pose
 
 Pairs = Sequence[tuple[str, str]]
 _RESAMPLES = 10_000
@@ -39,10 +39,10 @@ class Row:
     """One method on a set of pairs, in whole clouds or in scans.
 
     iou: by part, mean over the pairs that both have it, with their number; mean: over all of
-    those; plain: over those whose reference has no mixed pieces, so that all of each part was
-    taught. Of a method that tells absence, else None: told (present parts that were told absent or
-    not observed), skipped (those, and present parts below `MIN_CONFIDENCE`), absent (absent parts
-    that were skipped), hidden (parts not seen in the scan that were skipped).
+    those; plain: over those whose reference has no mixed pieces, so that each part is a region as
+    a whole. Of a method that tells absence, else None: told (present parts that were reported
+    absent or not observed), skipped (those, and present parts below `MIN_CONFIDENCE`), absent
+    (absent parts that were skipped), hidden (parts not seen in the scan that were skipped).
     """
 
     set: str
@@ -77,28 +77,28 @@ class Difference:
 @dataclass(frozen=True)
 class Poses:
     """Alignments of a set's targets. right: within 5 degrees, of those whose front is known;
-    doubted: wrong ones that were doubted; scale: median relative error; seconds: median."""
+    warned: wrong ones with a warning; scale: median relative error; seconds: median."""
 
     set: str
     views: int
     right: Count
-    doubted: Count
+    warned: Count
     scale: float
     seconds: float
 
 
-def is_skipped(part: PartFigure) -> bool:
+def is_skipped(part: PartResult) -> bool:
     """Whether a transfer would leave a part out: reported absent or not observed, or in doubt."""
     return bool(part.reason) or part.score is None or part.score < MIN_CONFIDENCE
 
 
-def rows_of(figures: Sequence[PairFigure], sets: Mapping[str, Pairs]) -> list[Row]:
+def rows_of(results: Sequence[ObjectPairResult], sets: Mapping[str, Pairs]) -> list[Row]:
     """A row a set, view and method; empty ones are left out. sets: name to pairs of objects."""
-    views = dict.fromkeys(figure.views for figure in figures)
-    methods = dict.fromkeys(figure.method for figure in figures)
+    views = dict.fromkeys(result.views for result in results)
+    methods = dict.fromkeys(result.method for result in results)
     found = []
     for name, pairs in sets.items():
-        mine = select(figures, pairs)
+        mine = select(results, pairs)
         for number in views:
             for method in methods:
                 of = [f for f in mine if (f.views, f.method) == (number, method)]
@@ -107,8 +107,8 @@ def rows_of(figures: Sequence[PairFigure], sets: Mapping[str, Pairs]) -> list[Ro
     return found
 
 
-def _row(name: str, views: int, method: str, figures: Sequence[PairFigure]) -> Row:
-    parts = [part for figure in figures for part in figure.parts]
+def _row(name: str, views: int, method: str, results: Sequence[ObjectPairResult]) -> Row:
+    parts = [part for result in results for part in result.parts]
     there, absent, hidden = (
         [part for part in parts if part.state == state] for state in (THERE, ABSENT, HIDDEN)
     )
@@ -117,18 +117,18 @@ def _row(name: str, views: int, method: str, figures: Sequence[PairFigure]) -> R
         by_part.setdefault(part.part, []).append(part.iou or 0.0)
     tells = any(part.score is not None for part in parts)
 
-    def count(asked: Sequence[PartFigure], yes: Sequence[bool]) -> Count | None:
+    def count(asked: Sequence[PartResult], yes: Sequence[bool]) -> Count | None:
         return Count(sum(yes), len(asked)) if tells else None
 
     return Row(
         set=name,
         views=views,
         method=method,
-        pairs=len(figures),
+        pairs=len(results),
         iou={part: (float(np.mean(values)), len(values)) for part, values in by_part.items()},
         mean=_mean(there),
-        plain=_mean([p for f in figures if f.mixed[0] < LEAST_SHARE for p in f.parts]),
-        seconds=float(np.median([figure.seconds for figure in figures])),
+        plain=_mean([p for f in results if f.mixed[0] < LEAST_SHARE for p in f.parts]),
+        seconds=float(np.median([result.seconds for result in results])),
         told=count(there, [bool(part.reason) for part in there]),
         skipped=count(there, [is_skipped(part) for part in there]),
         absent=count(absent, [is_skipped(part) for part in absent]),
@@ -136,23 +136,23 @@ def _row(name: str, views: int, method: str, figures: Sequence[PairFigure]) -> R
     )
 
 
-def _mean(parts: Sequence[PartFigure]) -> float:
+def _mean(parts: Sequence[PartResult]) -> float:
     values = [part.iou or 0.0 for part in parts if part.state == THERE]
     return float(np.mean(values)) if values else float("nan")
 
 
 def difference_of(
-    figures: Sequence[PairFigure], of: Row, one: str = "nrdf", other: str = "registration"
+    results: Sequence[ObjectPairResult], of: Row, one: str = "nrdf", other: str = "registration"
 ) -> Difference | None:
-    """How much better one method is than another on a set's figures; None unless both were run, on
+    """How much better one method is than another on a set's results; None unless both were run, on
     five targets or more."""
     iou: dict[str, dict[tuple[str, str, str], float]] = {one: {}, other: {}}
-    for figure in figures:
-        if figure.views == of.views and figure.method in iou:
-            for part in figure.parts:
+    for result in results:
+        if result.views == of.views and result.method in iou:
+            for part in result.parts:
                 if part.state == THERE:
-                    key = figure.reference, figure.target, part.part
-                    iou[figure.method][key] = part.iou or 0.0
+                    key = result.reference, result.target, part.part
+                    iou[result.method][key] = part.iou or 0.0
     targets = list(dict.fromkeys(target for _, target, _ in iou[one]))
     if iou[one].keys() != iou[other].keys() or len(targets) < _LEAST_TARGETS:
         return None
@@ -168,12 +168,12 @@ def difference_of(
     )
 
 
-def poses_of(figures: Sequence[PairFigure], of: Row) -> Poses | None:
+def poses_of(results: Sequence[ObjectPairResult], of: Row) -> Poses | None:
     """How well the targets of a set's scans were aligned; None of whole clouds."""
     poses: dict[str, Pose] = {
-        figure.target: figure.pose
-        for figure in figures
-        if figure.views == of.views and figure.pose is not None
+        result.target: result.pose
+        for result in results
+        if result.views == of.views and result.pose is not None
     }
     if not poses:
         return None
@@ -183,16 +183,16 @@ def poses_of(figures: Sequence[PairFigure], of: Row) -> Poses | None:
         of.set,
         of.views,
         Count(len(known) - len(wrong), len(known)),
-        Count(sum(pose.doubted for pose in wrong), len(wrong)),
+        Count(sum(pose.warned for pose in wrong), len(wrong)),
         float(np.median([pose.scale for pose in poses.values()])),
         float(np.median([pose.seconds for pose in poses.values()])),
     )
 
 
-def select(figures: Sequence[PairFigure], pairs: Pairs) -> list[PairFigure]:
-    """The figures of a set's pairs."""
+def select(results: Sequence[ObjectPairResult], pairs: Pairs) -> list[ObjectPairResult]:
+    """The results of a set's pairs."""
     chosen = {*pairs}
-    return [figure for figure in figures if (figure.reference, figure.target) in chosen]
+    return [result for result in results if (result.reference, result.target) in chosen]
 
 
 def headings(parts: Sequence[str]) -> list[str]:
@@ -226,7 +226,7 @@ def tables(rows: Sequence[Row]) -> Iterator[tuple[str, list[str], list[Row]]]:
         yield caption(mine[0]), parts, mine
 
 
-def to_csv(figures: Sequence[PairFigure]) -> str:
+def to_csv(results: Sequence[ObjectPairResult]) -> str:
     """A line a method, pair and part."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -235,19 +235,19 @@ def to_csv(figures: Sequence[PairFigure]) -> str:
         "found_points", "reason", "skipped", "score", "confidence", "observed", "evidence",
         "reference_mixed", "target_mixed", "pose_error_deg", "seconds_a_pair",
     ])  # fmt: skip
-    for figure in figures:
-        degrees = None if figure.pose is None else figure.pose.degrees
+    for result in results:
+        degrees = None if result.pose is None else result.pose.degrees
         pose = "" if degrees is None else f"{degrees:.3f}"
-        for part in figure.parts:
+        for part in result.parts:
             own = [part.iou, part.score, part.confidence, part.observed]
             iou, *told = ("" if value is None else f"{value:.6g}" for value in own)
             skipped = "" if part.score is None else str(is_skipped(part)).lower()
             writer.writerow([
-                figure.method, figure.views,
-                *map(spreadsheet_text, (figure.reference, figure.target, part.part)),
+                result.method, result.views,
+                *map(spreadsheet_text, (result.reference, result.target, part.part)),
                 part.state, iou, part.true, part.found, part.reason, skipped, *told,
                 " ".join(f"{value:.6g}" for value in part.evidence),
-                *(f"{share:.4f}" for share in figure.mixed), pose,
-                f"{figure.seconds:.4f}",
+                *(f"{share:.4f}" for share in result.mixed), pose,
+                f"{result.seconds:.4f}",
             ])  # fmt: skip
     return text.getvalue()

@@ -68,10 +68,10 @@ def measure_retrieval(
     seconds, phases = [], []
     for target in targets:
         clock.lap()
-        embedded = loaded.encode(target)
-        encoded_reference.retrieve_all(regions, embedded)
+        encoded = loaded.encode(target)
+        encoded_reference.retrieve_all(regions, encoded)
         seconds.append(clock.lap())
-        phases.append(embedded.seconds)
+        phases.append(encoded.seconds)
     return RetrievalSpeed(
         preset=preset,
         model=model,

@@ -28,7 +28,7 @@ from nrdf_benchmark.ablation.table import (
 )
 from nrdf_benchmark.ablation.training import OMITTED
 from nrdf_benchmark.bsrc.dataset import read_bsrc
-from nrdf_benchmark.methods.learned import FieldMatch
+from nrdf_benchmark.methods.learned import FieldMethod
 from nrdf_benchmark.metrics import MISSED
 
 
@@ -76,7 +76,7 @@ def test_scores_on_bsrc_are_those_of_the_evaluation_and_are_kept(tmp_path, untra
     told = []
     found = benchmark_scores(benchmark, tmp_path / "run", progress=lambda *a: told.append(a[1:]))
     assert list(found) == list(benchmark.rois) and told == [(0, 2), (1, 2), (2, 2)]
-    match = FieldMatch(nrdf.load_model(untrained), "points")
+    match = FieldMethod(nrdf.load_model(untrained), "points")
     cases = [Case(a.cloud, a.regions, b.cloud, b.regions) for a, b in benchmark.pairs]
     assert found == pytest.approx(score(match, cases))
     monkeypatch.setattr("nrdf_benchmark.bsrc.evaluate.run_pair", None)

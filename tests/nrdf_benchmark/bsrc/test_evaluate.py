@@ -68,8 +68,8 @@ def test_a_region_found_nowhere_is_counted_as_missed(benchmark):
 
     result = run_pair(match, "chair", *benchmark.objects[:2])
     assert [roi for roi, count in result.points.items() if not count] == ["3"]
-    assert result.figures["3"]["cd-l1"] == 1.0 > result.figures["1"]["cd-l1"]
-    assert set(result.figures["3"]) == set(METRICS)
+    assert result.metrics["3"]["cd-l1"] == 1.0 > result.metrics["1"]["cd-l1"]
+    assert set(result.metrics["3"]) == set(METRICS)
 
 
 def test_confidence_divides_the_regions_into_sure_and_unsure(benchmark, copy):
@@ -118,7 +118,7 @@ def test_an_interrupted_evaluation_goes_on(benchmark, copy, tmp_path, monkeypatc
 
     monkeypatch.setattr(module, "run_pair", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        evaluate(benchmark, [COPY], store=PairCache(tmp_path))
+        evaluate(benchmark, [COPY], cache=PairCache(tmp_path))
     monkeypatch.setattr(module, "run_pair", lambda *a: runs.append(a) or real(*a))
     told = []
     (result,) = evaluate(benchmark, [COPY], 1, PairCache(tmp_path), lambda *a: told.append(a))

@@ -89,7 +89,7 @@ def test_results_are_written_with_every_figure(benchmark, results, tmp_path):
             p for p in result.pairs if (p.reference, p.target) == (row["reference"], row["target"])
         )
         for name in METRICS:
-            value = pair.figures[row["roi"]][name]
+            value = pair.metrics[row["roi"]][name]
             assert row[name] == "" if value is None else float(row[name]) == pytest.approx(value)
 
     content = json.loads(written[2].read_text())
@@ -100,7 +100,7 @@ def test_results_are_written_with_every_figure(benchmark, results, tmp_path):
     copy = content["methods"]["copy"]
     assert copy["weights_sha256"] is None
     assert copy["mean"]["cd-l1"] == pytest.approx(results[0].mean())
-    assert copy["pairs"][1]["figures"] == results[0].pairs[1].figures
+    assert copy["pairs"][1]["metrics"] == results[0].pairs[1].metrics
     assert copy["pairs"][1]["seconds"] == results[0].pairs[1].seconds
 
 

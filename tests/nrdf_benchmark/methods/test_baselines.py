@@ -14,7 +14,7 @@ from nrdf.io.cloud import PointCloud
 from nrdf_benchmark.bsrc.dataset import read_bsrc
 from nrdf_benchmark.bsrc.evaluate import evaluate
 from nrdf_benchmark.methods import baselines as module
-from nrdf_benchmark.methods.baselines import Copied, Registered, hidden_point_normals
+from nrdf_benchmark.methods.baselines import RegistrationMask, SnappedCopy, hidden_point_normals
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.metrics import chamfer_l1
 
@@ -46,7 +46,7 @@ def distances(found, target, regions):
 @pytest.mark.parametrize("box, normals", COPIES)
 def test_identical_objects_have_identical_regions(chairs, box, normals):
     (first, regions), (second, _), _ = chairs
-    found = Copied(box, normals)(first, regions, second)
+    found = SnappedCopy(box, normals)(first, regions, second)
     for name, indices in regions.items():
         np.testing.assert_array_equal(found[name], indices)
 
@@ -55,17 +55,17 @@ def test_identical_objects_have_identical_regions(chairs, box, normals):
 def test_box_undoes_a_stretched_and_shifted_box_and_copy_does_not(chairs, normals):
     first, regions = chairs[0]
     target = PointCloud(first.points * [0.7, 1.2, 0.9] + [0.1, 0.0, -0.2])
-    box = Copied(True, normals)(first, regions, target)
+    box = SnappedCopy(True, normals)(first, regions, target)
     # Normals of a stretched cloud are not quite the same: neighbours may be taken.
     assert np.mean(distances(box, target, regions)) < (0.05 if normals else 1e-6)
-    copy = Copied(False, normals)(first, regions, target)
+    copy = SnappedCopy(False, normals)(first, regions, target)
     assert np.mean(distances(copy, target, regions)) > 0.1
 
 
 def test_copied_points_are_snapped_one_by_one(chairs):
     """Repetitions are kept, in the region's order: a Chamfer distance counts them."""
     (first, regions), _, (third, _) = chairs
-    found = Copied(box=False, normals=False)(first, regions, third)
+    found = SnappedCopy(box=False, normals=False)(first, regions, third)
     for name, indices in regions.items():
         expected = cKDTree(third.points).query(first.points[indices])[1]
         np.testing.assert_array_equal(found[name], expected)
@@ -86,8 +86,8 @@ def test_normals_keep_a_copy_on_its_side_of_a_thin_plate(unit):
     moved, moved_front = slab(0.07)  # where the front was is now nearer to the back
     regions = {"front": np.flatnonzero(front & (np.abs(points[:, 1:]) < 0.4).all(axis=1))}
     reference, target = PointCloud(unit * points), PointCloud(unit * moved)
-    with_normals = Copied(False, True)(reference, regions, target)["front"]
-    without = Copied(False, False)(reference, regions, target)["front"]
+    with_normals = SnappedCopy(False, True)(reference, regions, target)["front"]
+    without = SnappedCopy(False, False)(reference, regions, target)["front"]
     assert moved_front[with_normals].mean() > 0.97
     assert moved_front[without].mean() < 0.03
 
@@ -106,7 +106,7 @@ def test_hidden_point_normals_point_outward():
 
 def test_registration_finds_identical_and_stretched_regions(chairs):
     (first, regions), (second, _), _ = chairs
-    match = Registered()
+    match = RegistrationMask()
     assert max(distances(match(first, regions, second), second, regions)) < 0.05
     stretched = PointCloud(second.points * [0.8, 1.1, 0.9])
     assert np.mean(distances(match(first, regions, stretched), stretched, regions)) < 0.05
@@ -114,10 +114,10 @@ def test_registration_finds_identical_and_stretched_regions(chairs):
 
 def test_registration_gives_masks_and_does_not_mind_the_unit(chairs):
     (first, regions), _, (third, third_regions) = chairs
-    found = Registered()(first, regions, third)
+    found = RegistrationMask()(first, regions, third)
     assert 0.01 < np.mean(distances(found, third, third_regions)) < 0.4
     large = PointCloud(1000 * third.points + 5)
-    for name, indices in Registered()(first, regions, large).items():
+    for name, indices in RegistrationMask()(first, regions, large).items():
         assert (np.diff(indices) > 0).all()
         # Rounding moves a boundary by a point here and there.
         assert len(np.setxor1d(indices, found[name])) <= 0.05 * len(indices)
@@ -128,7 +128,7 @@ def test_the_template_is_made_once_a_reference(chairs, monkeypatch):
     made = []
     template = module._Template
     monkeypatch.setattr(module, "_Template", lambda *a: made.append(1) or template(*a))
-    match = Registered()
+    match = RegistrationMask()
     for reference, target in ((first, second), (first, third), (third, second)):
         match(reference, regions, target)
     assert len(made) == 2

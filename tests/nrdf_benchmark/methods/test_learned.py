@@ -11,7 +11,7 @@ from builders.small_model import SMALL
 from nrdf.field import build_field
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.model import Model
-from nrdf_benchmark.methods.learned import FieldMatch
+from nrdf_benchmark.methods.learned import FieldMethod
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def clouds():
 
 def test_a_mask_is_what_the_model_retrieves(model, clouds):
     (first, _, third), regions = clouds
-    found = FieldMatch(model, "mask")(first, regions, third)
+    found = FieldMethod(model, "mask")(first, regions, third)
     expected = model.set_reference(first).retrieve_all(regions, third)
     for name, match in expected.items():
         np.testing.assert_array_equal(found[name], match.indices)
@@ -37,14 +37,14 @@ def test_a_mask_is_what_the_model_retrieves(model, clouds):
 
 def test_points_are_snapped_one_by_one_by_position_alone(model, clouds):
     (first, second, third), regions = clouds
-    found = FieldMatch(model, "points")(first, regions, third)
+    found = FieldMethod(model, "points")(first, regions, third)
     expected = model.set_reference(first).retrieve_all(regions, third, "points")
     for name, match in expected.items():
         assert len(found[name]) == len(regions[name])
         distance = np.linalg.norm(match.points[:, None] - third.points, axis=2)
         np.testing.assert_array_equal(found[name], distance.argmin(1))
     # An untrained field starts with the bounding box copy: the identity on the same object.
-    same = FieldMatch(model, "points")(first, regions, second)
+    same = FieldMethod(model, "points")(first, regions, second)
     for name, indices in regions.items():
         np.testing.assert_array_equal(same[name], indices)
 
@@ -54,7 +54,7 @@ def test_the_reference_is_taught_once_and_every_target_embedded(model, clouds, m
     calls = []
     embed = model.field.embed
     monkeypatch.setattr(model.field, "embed", lambda *a: calls.append(1) or embed(*a))
-    match = FieldMatch(model, "mask")
+    match = FieldMethod(model, "mask")
     for target in (second, third, second):
         match(first, regions, target)
     assert len(calls) == 1 + 3

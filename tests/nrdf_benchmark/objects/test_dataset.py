@@ -12,7 +12,7 @@ import pytest
 from builders.labelled_boxes import LABELS, furniture, write_object, write_objects
 from nrdf.errors import DataError
 from nrdf_benchmark.objects.dataset import (
-    Listed,
+    ObjectEntry,
     list_objects,
     read_labels,
     read_object,
@@ -143,7 +143,7 @@ def test_arrays_are_checked_before_room_is_made_for_them(root, name, member, mes
         if member is not None:
             archive.writestr(f"{name}.npy", member)
     with pytest.raises(DataError) as caught:
-        read_object(root, Listed("chair", "low"), read_labels(root))
+        read_object(root, ObjectEntry("chair", "low"), read_labels(root))
     assert message in str(caught.value) and str(path) in str(caught.value)
 
 

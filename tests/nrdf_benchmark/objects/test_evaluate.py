@@ -1,4 +1,4 @@
-"""`nrdf eval objects`: figures of pairs, and what is kept of them."""
+"""`nrdf eval objects`: results of pairs, and what is cache of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nrdf.field.zoo import find_weights
 from nrdf_benchmark.methods.registry import MethodSpec, find_methods
 from nrdf_benchmark.objects.dataset import read_objects
 from nrdf_benchmark.objects.evaluate import evaluate_objects, pairs_of
-from nrdf_benchmark.objects.retrieval import Settings, finder
+from nrdf_benchmark.objects.retrieval import Settings, shared_retrieval
 from nrdf_benchmark.objects.table import rows_of
 from nrdf_benchmark.result_cache import LineCache
 
@@ -32,26 +32,28 @@ def settings(root):
     return Settings(root, find_weights("chair"), POINTS)
 
 
-def by_part(figure):
-    return {part.part: part for part in figure.parts}
+def by_part(result):
+    return {part.part: part for part in result.parts}
 
 
 def test_parts_are_found_and_scored_by_every_kind_of_method(settings):
     for spec in find_methods(["nrdf", "registration", "box-mask"], "chair"):
-        figure = finder(settings).run(spec, 0, "chair/low", "chair/high")
-        parts = by_part(figure)
-        assert set(parts) == {"seat", "back", "leg"} and figure.pose is None
+        result = shared_retrieval(settings).run(spec, 0, "chair/low", "chair/high")
+        parts = by_part(result)
+        assert set(parts) == {"seat", "back", "leg"} and result.pose is None
         for part in parts.values():
             assert part.state == "there" and part.iou > 0.6, (spec.name, part)
             assert (part.score is not None) == (spec.name == "nrdf")
-        lacking = by_part(finder(settings).run(spec, 0, "chair/low", "stool/plain"))
+        lacking = by_part(shared_retrieval(settings).run(spec, 0, "chair/low", "stool/plain"))
         assert (lacking["back"].state, lacking["back"].iou) == ("absent", None)
-    assert "back" not in by_part(finder(settings).run(spec, 0, "stool/plain", "chair/low"))
+    assert "back" not in by_part(
+        shared_retrieval(settings).run(spec, 0, "stool/plain", "chair/low")
+    )
 
 
 def test_what_absence_was_told_by_is_kept(settings):
     (spec,) = find_methods(["nrdf"], "chair")
-    back = by_part(finder(settings).run(spec, 0, "chair/high", "stool/plain"))["back"]
+    back = by_part(shared_retrieval(settings).run(spec, 0, "chair/high", "stool/plain"))["back"]
     assert back.reason == "absent" and back.confidence > 0.5 and len(back.evidence) >= 2
     assert (back.found, back.score) == (0, 0)
 
@@ -60,13 +62,13 @@ def test_what_was_measured_is_not_measured_again(settings, root, tmp_path, monke
     objects = read_objects(root)
     pairs = pairs_of(objects, ["chair", "stool"])
 
-    def run(kept, **changed):
+    def run(cache, **changed):
         told = []
-        figures = evaluate_objects(
-            replace(settings, **changed), objects, pairs, [BOX], kept=kept,
+        results = evaluate_objects(
+            replace(settings, **changed), objects, pairs, [BOX], cache=cache,
             progress=lambda *words: told.append(words),
         )  # fmt: skip
-        return figures, told[0][1]
+        return results, told[0][1]
 
     first, there = run(LineCache(tmp_path))
     assert there == 0 and [(f.reference, f.target) for f in first] == pairs
@@ -120,7 +122,7 @@ def test_options_that_make_no_sense_are_named(root, tmp_path, capsys, words, mes
 def test_real_furniture():
     settings = Settings(Path(IKEA), find_weights("chair"))
     pairs = [("chair/agam", "chair/mammut_1"), ("chair/sigurd", "chair/sundvik")]
-    figures = [finder(settings).run(REGISTRATION, 0, *pair) for pair in pairs]
-    (row,) = rows_of(figures, {"chair+stool": pairs})
+    results = [shared_retrieval(settings).run(REGISTRATION, 0, *pair) for pair in pairs]
+    (row,) = rows_of(results, {"chair+stool": pairs})
     assert row.iou["seat"][0] > 0.6 and row.iou["back"][0] > 0.9 and row.mean > 0.6
     assert row.told is None

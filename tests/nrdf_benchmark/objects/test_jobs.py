@@ -12,7 +12,7 @@ from nrdf_benchmark.methods.registry import find_methods
 from nrdf_benchmark.objects import jobs as objects_jobs
 from nrdf_benchmark.objects.jobs import run_job
 from nrdf_benchmark.objects.picture import draw_worst
-from nrdf_benchmark.objects.retrieval import Settings, finder
+from nrdf_benchmark.objects.retrieval import Settings, shared_retrieval
 
 LOW, HIGH, STOOL = "chair/low", "chair/high", "stool/plain"
 
@@ -24,20 +24,22 @@ def settings(tmp_path_factory):
 
 
 def test_parts_are_found_in_scans_by_every_method_in_the_pose_that_was_found(settings):
-    known, specs = finder(settings), find_methods(["nrdf", "registration"], "chair")
-    figures = [known.run(spec, 3, LOW, HIGH) for spec in specs]
-    assert figures[0].pose == figures[1].pose
-    assert figures[0].pose.degrees < 5 and figures[0].pose.scale < 0.05
-    for figure in figures:
-        assert figure.parts[0].true == (known.seen(HIGH, 3).labelled.label == "seat").sum()
-        for part in figure.parts:
-            assert part.state == "there" and part.iou > 0.5, (figure.method, part)
+    retrieval, specs = shared_retrieval(settings), find_methods(["nrdf", "registration"], "chair")
+    results = [retrieval.run(spec, 3, LOW, HIGH) for spec in specs]
+    assert results[0].pose == results[1].pose
+    assert results[0].pose.degrees < 5 and results[0].pose.scale < 0.05
+    for result in results:
+        assert (
+            result.parts[0].true == (retrieval.target_cloud(HIGH, 3).labelled.label == "seat").sum()
+        )
+        for part in result.parts:
+            assert part.state == "there" and part.iou > 0.5, (result.method, part)
 
 
 def test_pictures_of_the_worst_pairs(settings, tmp_path):
-    known, (spec,) = finder(settings), find_methods(["box-mask"], "chair")
-    figures = [known.run(spec, 0, LOW, target) for target in (HIGH, STOOL)]
-    paths = draw_worst(known, spec, figures, tmp_path / "worst")
+    retrieval, (spec,) = shared_retrieval(settings), find_methods(["box-mask"], "chair")
+    results = [retrieval.run(spec, 0, LOW, target) for target in (HIGH, STOOL)]
+    paths = draw_worst(retrieval, spec, results, tmp_path / "worst")
     names = {path.name.split("-", 1)[1] for path in paths}
     assert names == {"chair_low-to-chair_high.png", "chair_low-to-stool_plain.png"}
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)

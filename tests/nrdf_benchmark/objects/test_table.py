@@ -8,11 +8,11 @@ import json
 
 import pytest
 
-from nrdf_benchmark.objects.jobs import JobFigure, jobs_lines
+from nrdf_benchmark.objects.jobs import JobResult, jobs_lines
 from nrdf_benchmark.objects.pairs import draw_pairs
 from nrdf_benchmark.objects.picture import worst_pairs
 from nrdf_benchmark.objects.report import Report
-from nrdf_benchmark.objects.retrieval import PairFigure, PartFigure, Pose
+from nrdf_benchmark.objects.retrieval import ObjectPairResult, PartResult, Pose
 from nrdf_benchmark.objects.table import (
     Count,
     cells,
@@ -27,14 +27,14 @@ from nrdf_benchmark.objects.table import (
 
 def part(name, state="there", iou=None, reason="", score=None):
     told = {} if score is None else {"confidence": 0.5, "observed": 1.0, "evidence": (1.0, 2.0)}
-    return PartFigure(name, state, 100, 90, iou, reason, score, **told)
+    return PartResult(name, state, 100, 90, iou, reason, score, **told)
 
 
 def pair(method, reference, target, *parts, views=0, mixed=(0.0, 0.0), pose=None):
-    return PairFigure(method, views, reference, target, 0.5, parts, mixed, pose)
+    return ObjectPairResult(method, views, reference, target, 0.5, parts, mixed, pose)
 
 
-FIGURES = [
+RESULTS = [
     pair(
         "nrdf", "a/1", "a/2",
         part("seat", iou=0.8, score=0.7), part("leg", iou=0.0, reason="absent", score=0.0),
@@ -52,7 +52,7 @@ SETS = {"a": [("a/1", "a/2"), ("a/2", "a/1")]}
 
 
 def test_means_are_over_parts_that_both_have_and_counts_of_what_is_skipped():
-    nrdf, registration = rows_of(FIGURES, SETS)
+    nrdf, registration = rows_of(RESULTS, SETS)
     assert nrdf.iou == {"seat": (pytest.approx(0.6), 2), "leg": (0, 1)}
     assert nrdf.mean == pytest.approx(0.4) and nrdf.plain == pytest.approx(0.4)
     assert nrdf.told == Count(1, 3) and nrdf.skipped == Count(2, 3)
@@ -63,7 +63,7 @@ def test_means_are_over_parts_that_both_have_and_counts_of_what_is_skipped():
 
 
 def test_a_row_is_brief_on_a_terminal():
-    row = rows_of(FIGURES, SETS)[0]
+    row = rows_of(RESULTS, SETS)[0]
     full, brief = (cells(row, ["seat", "leg", "arm"], brief) for brief in (False, True))
     assert full[:4] == ["0.600", "0.000", "", "0.400"] and full[-3] == "33% (1/3)"
     assert brief[:4] == ["0.60", "0.00", "", "0.400"] and brief[-3] == "33%"
@@ -72,7 +72,7 @@ def test_a_row_is_brief_on_a_terminal():
 
 def test_sets_and_views_have_rows_of_their_own():
     seen = pair("nrdf", "a/1", "a/2", part("leg", "hidden", score=0.0), views=1)
-    rows = rows_of([*FIGURES, seen], {**SETS, "b": [("a/1", "a/2")], "none": []})
+    rows = rows_of([*RESULTS, seen], {**SETS, "b": [("a/1", "a/2")], "none": []})
     assert [(r.set, r.views, r.method, r.pairs) for r in rows] == [
         ("a", 0, "nrdf", 2), ("a", 0, "registration", 2), ("a", 1, "nrdf", 1),
         ("b", 0, "nrdf", 1), ("b", 0, "registration", 1), ("b", 1, "nrdf", 1),
@@ -86,39 +86,39 @@ def test_skipped_is_what_a_transfer_leaves_out():
 
 
 def test_the_interval_is_of_targets_drawn_anew():
-    figures = []
+    results = []
     for target in range(40):
         for reference in range(3):
             better = 0.1 if target % 2 else 0.3
             for method, iou in (("nrdf", 0.4 + better), ("registration", 0.4)):
                 names = f"a/r{reference}", f"a/{target}"
-                figures.append(pair(method, *names, part("seat", iou=iou)))
-    (row, _) = rows_of(figures, {"a": [(f.reference, f.target) for f in figures]})
-    found = difference_of(figures, row)
+                results.append(pair(method, *names, part("seat", iou=iou)))
+    (row, _) = rows_of(results, {"a": [(f.reference, f.target) for f in results]})
+    found = difference_of(results, row)
     assert found.mean == pytest.approx(0.2) and found.targets == 40
     # The mean of 40 draws of 0.1 or 0.3: standard deviation 0.1 / sqrt(40).
     assert found.low == pytest.approx(0.2 - 1.96 * 0.0158, abs=0.004)
     assert found.high == pytest.approx(0.2 + 1.96 * 0.0158, abs=0.004)
-    assert difference_of([f for f in figures if f.method == "nrdf"], row) is None
-    few = [f for f in figures if f.target in [f"a/{i}" for i in range(4)]]
+    assert difference_of([f for f in results if f.method == "nrdf"], row) is None
+    few = [f for f in results if f.target in [f"a/{i}" for i in range(4)]]
     assert difference_of(few, row) is None
-    report = Report(figures, {"a": [(f.reference, f.target) for f in figures]})
+    report = Report(results, {"a": [(f.reference, f.target) for f in results]})
     assert "a, whole: nrdf less registration +0.200 mean part IoU (95 %: +0.1" in report.lines()[0]
 
 
 def test_poses_count_each_target_once_and_fronts_only_where_they_are_known():
     poses = {"a/1": Pose(2.0, 0.01, False, 1.0), "a/2": Pose(180.0, 0.02, True, 2.0)}
     poses["a/3"] = Pose(None, 0.03, False, 3.0)
-    figures = [
+    results = [
         pair(method, "a/0", target, views=1, pose=pose)
         for method in ("nrdf", "registration")
         for target, pose in poses.items()
     ]
-    (row, _) = rows_of(figures, {"a": [("a/0", target) for target in poses]})
-    found = poses_of(figures, row)
-    assert found.right == Count(1, 2) and found.doubted == Count(1, 1)
+    (row, _) = rows_of(results, {"a": [("a/0", target) for target in poses]})
+    found = poses_of(results, row)
+    assert found.right == Count(1, 2) and found.warned == Count(1, 1)
     assert found.scale == 0.02 and found.seconds == 2.0
-    assert poses_of(FIGURES, rows_of(FIGURES, SETS)[0]) is None
+    assert poses_of(RESULTS, rows_of(RESULTS, SETS)[0]) is None
 
 
 def test_worst_pairs_come_first_and_those_without_parts_not_at_all():
@@ -131,7 +131,7 @@ def test_worst_pairs_come_first_and_those_without_parts_not_at_all():
 
 
 def test_every_part_has_a_line():
-    rows = list(csv.DictReader(io.StringIO(to_csv(FIGURES))))
+    rows = list(csv.DictReader(io.StringIO(to_csv(RESULTS))))
     assert len(rows) == 10
     assert rows[1]["reason"] == "absent" and rows[1]["skipped"] == "true"
     assert rows[3]["iou"] == "" and rows[0]["evidence"] == "1 2"
@@ -140,7 +140,7 @@ def test_every_part_has_a_line():
 
 def job(ended=True, reasons=(), memory=10**9):
     seconds = {"transfer": 1.0, "programs": 0.5}
-    return JobFigure("a/1", "a/2", ended, not reasons, reasons, False, 2, seconds, memory)
+    return JobResult("a/1", "a/2", ended, not reasons, reasons, False, 2, seconds, memory)
 
 
 def test_jobs_say_how_many_ended_and_what_failed():
@@ -165,7 +165,7 @@ def test_the_same_pairs_are_drawn_every_time():
 def test_files_hold_the_tables_and_everything(tmp_path):
     nothing = pair("nrdf", "b/1", "b/2", part("seat", "absent", score=0.0))
     sets = {**SETS, "b": [("b/1", "b/2")]}
-    report = Report([*FIGURES, nothing], sets, [job()], {"command": "nrdf eval objects"})
+    report = Report([*RESULTS, nothing], sets, [job()], {"command": "nrdf eval objects"})
     paths = report.write(tmp_path)
     assert [path.name for path in paths] == ["objects.md", "objects.csv", "objects.json"]
     text = paths[0].read_text()
