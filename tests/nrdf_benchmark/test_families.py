@@ -23,7 +23,7 @@ def model() -> Model:
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     monkeypatch.setattr(module, "CLOUD_POINTS", 600)
-    monkeypatch.setattr(module, "PLACES", 200)
+    monkeypatch.setattr(module, "COMPARED_POINTS", 200)
 
 
 def test_the_ratio_is_of_the_means():

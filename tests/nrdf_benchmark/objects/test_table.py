@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-from nrdf_benchmark.objects.jobs import JobResult, jobs_lines
+from nrdf_benchmark.objects.jobs import JobResult, describe_jobs
 from nrdf_benchmark.objects.pairs import draw_pairs
 from nrdf_benchmark.objects.picture import worst_pairs
 from nrdf_benchmark.objects.report import Report
@@ -144,11 +144,11 @@ def job(ended=True, reasons=(), memory=10**9):
 
 
 def test_jobs_say_how_many_ended_and_what_failed():
-    first, *failed = jobs_lines([job(), job(reasons=("leg: absent",)), job(False, ("x", "y"))])
+    first, *failed = describe_jobs([job(), job(reasons=("leg: absent",)), job(False, ("x", "y"))])
     assert "2 of 3 pairs ended well, 1 with a tool path on every part" in first
     assert "1.5 s a pair" in first and "1.00 GB" in first
     assert failed == ["a/1 to a/2: y"]
-    assert "GB" not in jobs_lines([job(memory=None)])[0] and jobs_lines([]) == []
+    assert "GB" not in describe_jobs([job(memory=None)])[0] and describe_jobs([]) == []
 
 
 def test_the_same_pairs_are_drawn_every_time():
