@@ -34,6 +34,13 @@ def test_the_command_writes_the_scan_and_the_truth(tmp_path, capsys):
         (["--scale", "0"], "--scale 0 must be above 0"),
         (["--views", "0"], "views 0"),
     ):
-        given = ["scan", str(tmp_path / "ball.ply"), "--out", str(tmp_path / "b.ply"), *options]
+        given = [
+            "model",
+            "scan",
+            str(tmp_path / "ball.ply"),
+            "--out",
+            str(tmp_path / "b.ply"),
+            *options,
+        ]
         assert cli.run(given) == 2
         assert message in capsys.readouterr().err
