@@ -10,8 +10,8 @@ model = nrdf.load_model("chair")
 reference, regions = bundled_chair("reference")  # PointCloud, name -> mask (8192,)
 target, truth = bundled_chair("ladder-back")
 
-taught = model.set_reference(reference)  # embeds and describes the reference once
-matches = taught.retrieve_all(regions, target)  # embeds the target once for all regions
+encoded = model.set_reference(reference)  # encodes the reference once
+matches = encoded.retrieve_all(regions, target)  # encodes the target once for all regions
 
 for name, match in matches.items():
     # match.indices (k,): the target's own points; match.confidence (k,) in [0, 1]

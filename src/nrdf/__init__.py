@@ -1,8 +1,8 @@
 """Neural Region Descriptor Fields: teach a region once, find it on every such object.
 
     model = nrdf.load_model("chair")
-    taught = model.set_reference(nrdf.read_cloud("reference.ply"))
-    match = taught.retrieve(region, "target.ply")  # or an array (n, 3), a mesh, ...
+    encoded = model.set_reference(nrdf.read_cloud("reference.ply"))
+    match = encoded.retrieve(region, "target.ply")  # or an array (n, 3), a mesh, ...
 
     process = nrdf.load_process("chair.yaml")  # process knowledge: regions and their processes
     result = process.transfer("target.ply")

@@ -149,7 +149,7 @@ def test_a_dense_reference_keeps_every_point_of_its_regions(model, dense):
     assert overlap(by_mask.indices, masks["seat"]) > 0.9
     np.testing.assert_allclose(by_mask.points, cloud.points[region], atol=1e-5)
     # A region that lies wholly between the points in use is not lost.
-    unused = np.setdiff1d(region, taught.reference.working)[:40]
+    unused = np.setdiff1d(region, taught.encoded_cloud.working)[:40]
     assert taught._working_mask(unused).any()
     by_points = taught.retrieve(unused, cloud, "points")
     np.testing.assert_allclose(by_points.points, cloud.points[unused], atol=1e-5)
@@ -265,7 +265,7 @@ def test_a_pose_takes_the_place_of_orientation_and_box(taught, reference):
     cloud, masks = reference
     turn = upright(up_axis("z")) @ rotation_about_up(2.0)
     pose = Similarity(turn, np.array([5.0, -7.0, 9.0]), 30.0)
-    own = taught.reference.pose
+    own = taught.encoded_cloud.pose
     scan = PointCloud(pose.to_scan(own.to_canonical(cloud.points)), cloud.normals @ turn.T)
     encoded = taught.model.encode(scan, pose)
     match = taught.retrieve(masks["seat"], encoded)

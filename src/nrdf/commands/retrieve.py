@@ -120,19 +120,19 @@ def retrieve(
             target_cloud, doubts = scan.scan, scan.warnings
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
-        taught = loaded.set_reference(reference_cloud)
+        encoded = loaded.set_reference(reference_cloud)
         clock.lap("reference")
-        embedded = loaded.encode(target_cloud) if scan is None else scan.encode()
-        kind = taught.check_kind(embedded) if scan is None else scan.kind
+        encoded_target = loaded.encode(target_cloud) if scan is None else scan.encode()
+        kind = encoded.check_kind(encoded_target) if scan is None else scan.kind
         if scan is None:
             doubts = list(kind.warnings)
             warn_of(doubts, target)
-        matches = taught.retrieve_all(regions, embedded, method, refine, check=False)
+        matches = encoded.retrieve_all(regions, encoded_target, method, refine, check=False)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
         panels = [
             region_panel(title, reference_cloud, reference_indices(regions, reference_cloud)),
-            target_panel(target.name, embedded, {n: m.indices for n, m in matches.items()}),
+            target_panel(target.name, encoded_target, {n: m.indices for n, m in matches.items()}),
         ]
         if scan is not None:
             matches = {name: match.in_scan(scan) for name, match in matches.items()}
@@ -150,7 +150,7 @@ def retrieve(
             "kind": kind.describe(),
             **({} if scan is None else {"alignment": describe_alignment(scan)}),
             "regions": describe_matches(matches, target_cloud),
-            "seconds": {**clock.seconds, "of the target": embedded.seconds},
+            "seconds": {**clock.seconds, "of the target": encoded_target.seconds},
             "versions": versions(),
         }
         write_report(folder, report)
@@ -195,14 +195,14 @@ def region_panel(
     return Panel(title, cloud.points, cloud.normals, dict(regions), note)
 
 
-def target_panel(title: str, embedded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
-    """An embedded cloud in the category's frame, with regions of the whole cloud's indices."""
+def target_panel(title: str, encoded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
+    """An encoded cloud in the category's frame, with regions of the whole cloud's indices."""
     import numpy as np
 
     from nrdf.viz.picture import Panel
 
-    shown = {name: np.isin(embedded.working, indices) for name, indices in regions.items()}
-    return Panel(title, embedded.points, embedded.normals, shown)
+    shown = {name: np.isin(encoded.working, indices) for name, indices in regions.items()}
+    return Panel(title, encoded.points, encoded.normals, shown)
 
 
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:

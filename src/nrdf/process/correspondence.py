@@ -43,29 +43,29 @@ class ReferenceSurface:
 
     def __init__(self, encoded: EncodedReference) -> None:
         self.encoded = encoded
-        self.surface = surface_of(encoded.reference)
+        self.surface = surface_of(encoded.encoded_cloud)
 
     @cached_property
     def mirrored(self) -> EncodedReference:
         """The reference's mirror image, left for right; its own frame is the canonical one."""
         model = self.encoded.model
-        return EncodedReference(model, _mirrored(model, self.encoded.reference))
+        return EncodedReference(model, _mirrored(model, self.encoded.encoded_cloud))
 
     @cached_property
     def anchors(self) -> np.ndarray:
         """Evenly spread working points (a,) whose positions on a target are refined."""
-        return downsample(self.encoded.reference.points, _ANCHORS, np.random.default_rng(0))
+        return downsample(self.encoded.encoded_cloud.points, _ANCHORS, np.random.default_rng(0))
 
     @cached_property
     def template(self) -> RegistrationTemplate:
         """The anchors, ready to be moved."""
-        reference, at = self.encoded.reference, self.anchors
+        reference, at = self.encoded.encoded_cloud, self.anchors
         return RegistrationTemplate(reference.points[at], reference.normals[at], _REGISTRATION)
 
     @cached_property
     def tree(self) -> cKDTree:
         """The anchors in position and normal."""
-        reference, at = self.encoded.reference, self.anchors
+        reference, at = self.encoded.encoded_cloud, self.anchors
         return cKDTree(
             oriented_features(reference.points[at], reference.normals[at], NORMAL_WEIGHT)
         )
@@ -89,7 +89,7 @@ class Correspondence:
     @property
     def scale(self) -> float:
         """How much larger the target is than the reference, by their longest sides."""
-        return self.target.pose.scale / self.reference.encoded.reference.pose.scale
+        return self.target.pose.scale / self.reference.encoded.encoded_cloud.pose.scale
 
     @cached_property
     def _mirrored(self) -> EncodedCloud:
@@ -97,7 +97,7 @@ class Correspondence:
 
     def _mapped(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
         """The mean of where C puts points (m, 3) of the reference and their mirror images."""
-        encoded, reference = self.reference.encoded, self.reference.encoded.reference
+        encoded, reference = self.reference.encoded, self.reference.encoded.encoded_cloud
         one = encoded.map_surface_points(points, normals, self.target)
         other = self.reference.mirrored.map_surface_points(
             MIRROR * reference.canonical(points),
@@ -115,7 +115,7 @@ class Correspondence:
     def _registered(self) -> np.ndarray:
         """Displacement (a, 3), canonical, that brings each mapped anchor onto the target."""
         reference, target = self.reference, self.target
-        whole, anchors = reference.encoded.reference, reference.anchors
+        whole, anchors = reference.encoded.encoded_cloud, reference.anchors
         mapped = self._mapped(
             whole.original(whole.points[anchors]), whole.original_normals(whole.normals[anchors])
         )
@@ -132,7 +132,7 @@ class Correspondence:
         Returns points on its smooth surface (m, 3), normals there (m, 3), and whether the point
         has a counterpart (m,): the field trusts it, and it lies near the surface.
         """
-        target, whole = self.target, self.reference.encoded.reference
+        target, whole = self.target, self.reference.encoded.encoded_cloud
         mapped = self._mapped(points, normals)
         features = oriented_features(
             whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
@@ -177,13 +177,13 @@ class Correspondence:
         taken as affine; across the surface, where points say nothing, as a rotation and a scale.
         """
         encoded = self.reference.encoded
-        here = encoded.reference.cloud.points[region]
+        here = encoded.encoded_cloud.cloud.points[region]
         there = self.target.original(encoded.map_points(region, self.target).points)
         here, there = here - np.median(here, axis=0), there - np.median(there, axis=0)
         spread = here.T @ here
         size = float(np.trace(spread))
         if len(here) < 3 or size == 0.0:  # a spot has no orientation
-            canonical = encoded.reference.canonical_normals(np.asarray(direction, float))
+            canonical = encoded.encoded_cloud.canonical_normals(np.asarray(direction, float))
             return unit_vectors(self.target.original_normals(canonical))
         turn, _ = Rotation.align_vectors(there, here)
         similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()

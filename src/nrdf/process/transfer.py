@@ -168,7 +168,9 @@ class ProcessTransfer:
             if process.waypoints is not None:
                 segments = taught_segments(process, surface)
             else:
-                inside = self.reference.reference.to_working(self.bound_knowledge.regions[region])
+                inside = self.reference.encoded_cloud.to_working(
+                    self.bound_knowledge.regions[region]
+                )
                 once = replace(strategy_of(process), passes=1)
                 segments = tuple(s for s in plan(surface, inside, once) if s.kind == "process")
             self._segments[region, number] = segments

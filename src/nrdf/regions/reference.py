@@ -34,13 +34,13 @@ _MAPPED_BACK = 2048  # of a target's points
 class EncodedReference:
     """A reference, encoded, with its descriptors (paper, eq. 8), for any number of targets.
 
-    model: what encodes targets. reference: (n,) working points, canonical, with their embedding.
+    model: what encodes targets. encoded_cloud: the reference as the field sees it.
     """
 
-    def __init__(self, model: CloudEncoder, reference: EncodedCloud) -> None:
+    def __init__(self, model: CloudEncoder, encoded_cloud: EncodedCloud) -> None:
         self.model = model
-        self.reference = reference
-        self._k = describe(model, reference.z, reference.points, reference.normals)
+        self.encoded_cloud = encoded_cloud
+        self._k = describe(model, encoded_cloud.z, encoded_cloud.points, encoded_cloud.normals)
 
     def check_kind(self, target: EncodedCloud) -> KindCheck:
         """Whether a target looks like an object of the category, upright and facing forward in the
@@ -49,11 +49,11 @@ class EncodedReference:
 
     @cached_property
     def _scorer(self) -> PoseScorer:
-        return PoseScorer(self.model, [self.reference.cloud])
+        return PoseScorer(self.model, [self.encoded_cloud.cloud])
 
     @cached_property
     def _refiner(self) -> Refiner:
-        return Refiner(self.reference.points, self.reference.normals)
+        return Refiner(self.encoded_cloud.points, self.encoded_cloud.normals)
 
     def retrieve(
         self,
@@ -97,7 +97,7 @@ class EncodedReference:
         """
         if method not in METHODS:
             raise RegionError(unknown_name("method", method, METHODS))
-        reference, chosen = self.reference, {}
+        reference, chosen = self.encoded_cloud, {}
         for name, region in regions.items():
             try:
                 chosen[name] = region_indices(region, reference.cloud, lambda: reference.tree)
@@ -119,7 +119,7 @@ class EncodedReference:
         distance = encoded.distance(surface.points - surface.displacement, surface.normals)
         some = np.random.default_rng(0).permutation(len(encoded.points))[:_MAPPED_BACK]
         back = self._map_back(encoded, some)
-        nearest = self.reference.nearest(back.points, back.normals, VOTING_NEIGHBOURS)
+        nearest = self.encoded_cloud.nearest(back.points, back.normals, VOTING_NEIGHBOURS)
         matches = {
             name: self._with_presence(
                 match, chosen[name], encoded, surface, distance, (some, nearest), drop_absent
@@ -135,7 +135,7 @@ class EncodedReference:
     def map_surface(self, target: EncodedCloud, refine: bool = False) -> MappedPoints:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
         start = time.perf_counter()
-        mapped = invert(self.model, target.z, self._k, self.reference.normals)
+        mapped = invert(self.model, target.z, self._k, self.encoded_cloud.normals)
         target.seconds["map"] = time.perf_counter() - start
         if refine:
             start = time.perf_counter()
@@ -153,7 +153,7 @@ class EncodedReference:
 
         surface: what `map_surface` gave for the target, to follow it where it has been refined.
         """
-        reference = self.reference
+        reference = self.encoded_cloud
         if reference.is_whole:
             if surface is not None:
                 return surface.select(indices)
@@ -174,20 +174,20 @@ class EncodedReference:
 
         points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
         """
-        points = self.reference.canonical(points)
-        normals = self.reference.canonical_normals(normals)
+        points = self.encoded_cloud.canonical(points)
+        normals = self.encoded_cloud.canonical_normals(normals)
         return self._map(points, normals, target)
 
     def _map(self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud) -> MappedPoints:
         """Canonical points and normals (m, 3) of the reference on a target."""
-        k = describe(self.model, self.reference.z, points, normals)
+        k = describe(self.model, self.encoded_cloud.z, points, normals)
         return invert(self.model, target.z, k, normals)
 
     def _map_back(self, target: EncodedCloud, chosen: np.ndarray | slice) -> MappedPoints:
         """Working points of a target on the reference: C(z_reference, θ(z_target, x))."""
         points, normals = target.points[chosen], target.normals[chosen]
         k = describe(self.model, target.z, points, normals)
-        return invert(self.model, self.reference.z, k, normals)
+        return invert(self.model, self.encoded_cloud.z, k, normals)
 
     def correspondence_features(self, target: EncodedCloud) -> np.ndarray:
         """Features (n, 6) of a target's, or the reference's, working points by which points of
@@ -294,7 +294,7 @@ class EncodedReference:
 
     def _working_mask(self, indices: np.ndarray) -> np.ndarray:
         """Which working points of the reference a region holds, (n,) bool."""
-        reference = self.reference
+        reference = self.encoded_cloud
         mask = np.zeros(len(reference.points), bool)
         mask[reference.to_working(indices)] = True
         if mask.any():

@@ -43,6 +43,6 @@ class FieldMethod:
         self, reference: PointCloud, regions: Mapping[str, Any], target: PointCloud | EncodedCloud
     ) -> dict[str, Match]:
         """All that retrieval says of each region."""
-        if self._reference is None or self._reference.reference.cloud is not reference:
+        if self._reference is None or self._reference.encoded_cloud.cloud is not reference:
             self._reference = self.model.set_reference(reference)
         return self._reference.retrieve_all(regions, target, self.association, self.refine)

@@ -170,10 +170,10 @@ class LocalComputing:
             progress(done, len(files))
             kept = (self._prepared.model.category, reference, file)
             if kept not in self._features:
-                cloud = encoded.reference if file == reference else self._encode(file)
+                cloud = encoded.encoded_cloud if file == reference else self._encode(file)
                 self._features[kept] = encoded.correspondence_features(cloud)
             features[key] = self._features[kept]
-        cloud = encoded.reference
+        cloud = encoded.encoded_cloud
         own = oriented_features(cloud.points, cloud.normals, NORMAL_WEIGHT)
         return CorrespondenceFeatures(features, own, cloud.nearest_working)
 
