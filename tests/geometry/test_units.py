@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from nrdf.geometry.units import METRES, find_unit, guess_unit, in_words, other_names, to_si
+from nrdf.geometry.units import METRES, accepted_names, find_unit, guess_unit, readable, to_si
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ from nrdf.geometry.units import METRES, find_unit, guess_unit, in_words, other_n
     ],
 )
 def test_quantities_are_shown_as_people_read_them(name, value, words):
-    assert in_words(name, value) == words
+    assert readable(name, value) == words
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_quantities_are_shown_as_people_read_them(name, value, words):
     ],
 )
 def test_a_file_may_use_other_units(other, value, name, si):
-    assert list(other_names(name)) == [other]
+    assert list(accepted_names(name)) == [other]
     found = to_si({other: value, "rest": 1}, [name])
     assert found.pop("rest") == 1
     assert found[name] == (pytest.approx(si, rel=1e-14) if isinstance(si, float) else si)
@@ -84,25 +84,25 @@ def test_a_unit_is_guessed_only_where_it_is_the_only_plausible_one(size, categor
 )
 def test_a_unit_is_guessed_from_the_usual_size(size, category, unit):
     found = find_unit(None, size, category)
-    assert (found.name, found.origin, found.doubt) == (unit, "guessed", "")
+    assert (found.name, found.origin, found.warning) == (unit, "guessed", "")
 
 
 def test_no_unit_fits_or_nothing_is_known_of_the_category():
     found = find_unit(None, 1e-6, "chair")
-    assert found.name is None and "in no unit is it 0.4 to 1.6 m" in found.doubt
+    assert found.name is None and "in no unit is it 0.4 to 1.6 m" in found.warning
     assert find_unit(None, 1.0, "teapot").origin == "unknown"
 
 
 def test_a_given_unit_is_kept_but_doubted_where_it_is_far_off():
-    assert find_unit("mm", 900, "chair").doubt == ""
+    assert find_unit("mm", 900, "chair").warning == ""
     wrong = find_unit("m", 900, "chair")
-    assert wrong.name == "m" and "900 m is not the 0.4 to 1.6 m of a usual chair" in wrong.doubt
-    assert "in mm it would be" in wrong.doubt
+    assert wrong.name == "m" and "900 m is not the 0.4 to 1.6 m of a usual chair" in wrong.warning
+    assert "in mm it would be" in wrong.warning
     toy = find_unit("mm", 300, "chair")
-    assert toy.doubt == ""
+    assert toy.warning == ""
 
 
 def test_a_guess_between_several_units_is_doubted():
     found = find_unit(None, 50, "chair")
     assert (found.name, found.origin) == ("cm", "guessed")
-    assert found.doubt == "a usual chair may be this long in cm or in"
+    assert found.warning == "a usual chair may be this long in cm or in"

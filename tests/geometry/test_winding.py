@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from builders.awkward import SCALES, clouds
 from builders.solids import box
 from nrdf.errors import CloudError, DataError
-from nrdf.geometry.winding import Winding, mesh_winding_numbers
+from nrdf.geometry.winding import WindingNumber, mesh_winding_numbers
 
 BOX = np.array([0.4, 0.6, 1.0])
 
@@ -23,7 +23,7 @@ def elsewhere():
 
 
 def wound(points, normals, places):
-    return Winding(points, normals)(places)
+    return WindingNumber(points, normals)(places)
 
 
 def cube_mesh():
@@ -56,8 +56,8 @@ def test_inside_is_told_with_repeated_points_at_every_scale(elsewhere, scale, re
 def test_a_few_repeated_points_change_nothing():
     points, normals = box(BOX, 2000)
     places = np.random.default_rng(0).uniform(-0.5, 0.5, (200, 3))
-    alone = Winding(points, normals)(places)
-    twice = Winding(np.r_[points, points[:50]], np.r_[normals, normals[:50]])(places)
+    alone = WindingNumber(points, normals)(places)
+    twice = WindingNumber(np.r_[points, points[:50]], np.r_[normals, normals[:50]])(places)
     assert np.abs(alone - twice).max() < 1e-9
 
 
@@ -65,7 +65,7 @@ def test_the_two_sides_of_a_sheet_without_thickness_enclose_nothing():
     rng = np.random.default_rng(0)
     sheet = np.c_[rng.uniform(-0.5, 0.5, (1000, 2)), np.zeros(1000)]
     up = np.tile([0.0, 0.0, 1.0], (1000, 1))
-    found = Winding(np.r_[sheet, sheet], np.r_[up, -up])(rng.uniform(-0.5, 0.5, (200, 3)))
+    found = WindingNumber(np.r_[sheet, sheet], np.r_[up, -up])(rng.uniform(-0.5, 0.5, (200, 3)))
     assert np.abs(found).max() < 1e-9
 
 
@@ -75,14 +75,14 @@ def test_what_is_not_finite_is_refused(what, wrong):
     given = {"points": np.eye(3), "normals": np.eye(3), "places": np.eye(3)}
     given[what][1, 1] = wrong
     with pytest.raises(CloudError, match="finite"):
-        Winding(given["points"], given["normals"])(given["places"])
+        WindingNumber(given["points"], given["normals"])(given["places"])
 
 
 def test_normals_that_do_not_fit_are_refused():
     with pytest.raises(CloudError, match="as many"):
-        Winding(np.eye(3), np.eye(3)[:2])
+        WindingNumber(np.eye(3), np.eye(3)[:2])
     with pytest.raises(CloudError, match="as many"):
-        Winding(np.zeros((0, 3)), np.zeros((0, 3)))
+        WindingNumber(np.zeros((0, 3)), np.zeros((0, 3)))
 
 
 def damaged(name):

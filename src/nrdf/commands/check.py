@@ -95,7 +95,7 @@ def _show_planned(checked: list[CheckedProcess], points: dict[str, int]) -> None
 
 
 def _said(process: Process, name: str) -> str:
-    from nrdf.geometry.units import in_words
+    from nrdf.geometry.units import readable
 
     value = getattr(process, name)
-    return "–" if value is None else in_words(name, value)
+    return "–" if value is None else readable(name, value)

@@ -196,8 +196,8 @@ def _scan_unit(scan: AlignedScan, target: Path) -> tuple[str, list[str]]:
     from nrdf.geometry.units import METRES
 
     unit = scan.unit
-    if unit.name is None or (unit.origin == "guessed" and unit.doubt):
-        why = f" ({unit.doubt})" if unit.doubt else ""
+    if unit.name is None or (unit.origin == "guessed" and unit.warning):
+        why = f" ({unit.warning})" if unit.warning else ""
         raise ProcessError(
             f"{target} does not say its unit{why}: give --unit ({', '.join(METRES)})"
         )

@@ -34,7 +34,7 @@ def tangent_frames(normals: np.ndarray) -> np.ndarray:
 
 
 def frames_from_z_and_x(z: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Rotations (n, 3, 3), columns x, y, z, from unit z axes (n, 3) and wished x axes (n, 3).
+    """Rotations (n, 3, 3), columns x, y, z, from unit z axes (n, 3) and wanted x axes (n, 3).
 
     The x axis is brought square to z; where it is along z, any x is taken.
     """

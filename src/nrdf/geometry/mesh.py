@@ -19,7 +19,7 @@ MAX_FACES = 1_800_000
 MAX_COORDINATE = 1e12
 """The largest coordinate that is read, in any unit; beyond it are damaged files only, and numbers
 that cannot be squared."""
-SEEN_BY = 3  # a point belongs to the skin if this many of 40 directions see it
+MIN_VIEWS = 3  # a point belongs to the skin if this many of 40 directions see it
 _HASH = np.uint64(0x9E3779B97F4A7C15)  # odd, with evenly spread bits
 _PART = 1 << 17  # faces
 _CLEAR_VOTE = 3.0  # sum of cosines above which visibility overrules a face's own orientation
@@ -159,7 +159,7 @@ def outer_skin(
         points += triangle[:, 2] * (first * second)
         normals = cross[face] / area[face, None]
         vote, front, back = visibility(points, normals)
-        skin = np.flatnonzero(np.maximum(front, back) >= SEEN_BY)
+        skin = np.flatnonzero(np.maximum(front, back) >= MIN_VIEWS)
         if len(skin) >= count:
             break
         drawn *= 2

@@ -1,7 +1,7 @@
 """Units: of clouds, and of the quantities in files, whose names end with their unit.
 
 Inside everything is SI. People read and write millimetres, degrees and revolutions per minute: a
-file may give ``stepover_mm`` for ``stepover_m``, and `in_words` shows a value as people read it.
+file may give ``stepover_mm`` for ``stepover_m``, and `readable` shows a value as people read it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SPELLINGS = {
 USUAL_SIZES = {"chair": (0.4, 1.6), "car": (2.5, 8.0), "plane": (4.0, 85.0), "table": (0.4, 4.0)}
 """Longest sides (m) that objects of a category usually have."""
 
-_FAR = 3.0  # times outside of the usual sizes from which a unit that was given is doubted
+_FAR = 3.0  # times outside of the usual sizes from which a unit that was given counts as doubtful
 
 OTHER_UNITS = {
     "_mm_s": ("_m_s", 1e-3),
@@ -44,7 +44,7 @@ _SHOWN = (
 )
 
 
-def unit_named(word: str) -> str | None:
+def parse_unit(word: str) -> str | None:
     """The unit of `METRES` that a file means by "mm", "Millimeters" or the like, or None."""
     word = word.strip().lower()
     return next((unit for unit in METRES if word == unit or word in _SPELLINGS[unit]), None)
@@ -60,11 +60,11 @@ def guess_unit(longest_side: float, category: str) -> str | None:
 @dataclass(frozen=True)
 class Unit:
     """The unit of a scan. name: one of `METRES`, None if unknown. origin: "given", "guessed" or
-    "unknown". doubt: why it may be wrong, "" if nothing speaks against it."""
+    "unknown". warning: why it may be wrong, "" if nothing speaks against it."""
 
     name: str | None
     origin: str
-    doubt: str = ""
+    warning: str = ""
 
 
 def find_unit(given: str | None, longest_side: float, category: str) -> Unit:
@@ -91,7 +91,7 @@ def find_unit(given: str | None, longest_side: float, category: str) -> Unit:
     return Unit(given, "given", f"{size:.3g} m is not the {range_} of a usual {category}{hint}")
 
 
-def other_names(si_name: str) -> dict[str, float]:
+def accepted_names(si_name: str) -> dict[str, float]:
     """Other names that a file may use for an SI field, each with its factor to SI."""
     for other, (si, factor) in OTHER_UNITS.items():
         if si_name.endswith(si):
@@ -107,7 +107,7 @@ def to_si(content: Mapping[str, Any], si_names: list[str]) -> dict[str, Any]:
     """
     converted = dict(content)
     for si_name in si_names:
-        for other, factor in other_names(si_name).items():
+        for other, factor in accepted_names(si_name).items():
             if other not in converted:
                 continue
             if si_name in converted:
@@ -116,7 +116,7 @@ def to_si(content: Mapping[str, Any], si_names: list[str]) -> dict[str, Any]:
     return converted
 
 
-def in_words(name: str, value: float) -> str:
+def readable(name: str, value: float) -> str:
     """A quantity as people read it: ``in_words("stepover_m", 0.015)`` is "15 mm"."""
     for ending, factor, unit in _SHOWN:
         if name.endswith(ending):

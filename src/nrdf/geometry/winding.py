@@ -25,7 +25,7 @@ _LATTICE = float((1 << _BITS) - 1)  # steps along the longest side: 0.5 µm each
 _FARTHEST = 1e6  # longest sides away, from where every winding number is 0
 
 
-class Winding:
+class WindingNumber:
     """The generalised winding number of an oriented cloud (Barill et al., 2018).
 
     points: (n, 3), any unit; normals: (n, 3), outward. About 1 inside and 0 outside, holes in the

@@ -18,9 +18,9 @@ from nrdf.io.formats.detect import detect_reader
 
 logger = logging.getLogger(__name__)
 
-MOST_DROPPED = 0.01  # largest share of points that may have NaN or infinite coordinates
-SHORTEST = 1e-9  # longest side of a cloud's bounding box, at least
-FLATTEST = 1e-3  # least ratio of the smallest to the largest extent (standard deviations)
+MAX_DROPPED = 0.01  # largest share of points that may have NaN or infinite coordinates
+MIN_SIDE = 1e-9  # longest side of a cloud's bounding box, at least
+MIN_FLATNESS = 1e-3  # least ratio of the smallest to the largest extent (standard deviations)
 
 
 @dataclass(frozen=True)
@@ -135,10 +135,10 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
     missing = int((~finite).sum())
     if gaps and missing == len(cloud):
         raise CloudError(f"{path}: none of its {len(cloud)} points was measured: all are NaN")
-    if missing >= MOST_DROPPED * len(cloud) and missing and not gaps:
+    if missing >= MAX_DROPPED * len(cloud) and missing and not gaps:
         raise CloudError(
             f"{path}: {missing} of {len(cloud)} points have NaN or infinite coordinates; under "
-            f"{MOST_DROPPED:.0%} would be dropped: remove them, or export the cloud again"
+            f"{MAX_DROPPED:.0%} would be dropped: remove them, or export the cloud again"
         )
     if missing:
         level = logging.INFO if gaps else logging.WARNING
@@ -148,10 +148,10 @@ def _clean(path: Path, cloud: PointCloud, gaps: bool) -> PointCloud:
         check_coordinate_range(cloud.points)
     except DataError as error:
         raise CloudError(f"{path}: {error}") from error
-    return unit_normals(str(path), cloud)
+    return drop_partial_normals(str(path), cloud)
 
 
-def unit_normals(name: str, cloud: PointCloud) -> PointCloud:
+def drop_partial_normals(name: str, cloud: PointCloud) -> PointCloud:
     """The cloud, whose normals have unit length, or without them, with a warning, where some are
     missing. name: what it is, for the warning."""
     if cloud.normals is not None and not _has_unit_length(cloud.normals).all():
@@ -203,9 +203,9 @@ def check_coordinates(cloud: PointCloud) -> None:
     side = float(np.ptp(cloud.points, axis=0).max())
     if side <= 1e-12 * float(np.abs(cloud.points).max()):
         raise CloudError("all points of the cloud coincide; a cloud of a whole object is needed")
-    if side < SHORTEST:
+    if side < MIN_SIDE:
         raise CloudError(
-            f"the cloud's longest side is {side:.3g}; at least {SHORTEST:g} is needed: give it in "
+            f"the cloud's longest side is {side:.3g}; at least {MIN_SIDE:g} is needed: give it in "
             "a smaller unit"
         )
     if cloud.normals is not None:
@@ -231,11 +231,11 @@ def check_cloud(cloud: PointCloud, minimum_points: int) -> None:
     largest = float(np.abs(offset).max())
     offset = offset / largest
     extent = np.sqrt(np.maximum(np.linalg.eigvalsh(offset.T @ offset / len(offset)), 0.0))[::-1]
-    kind = "collinear" if extent[1] < FLATTEST * extent[0] else "flat"
-    if extent[2] < FLATTEST * extent[0]:
+    kind = "collinear" if extent[1] < MIN_FLATNESS * extent[0] else "flat"
+    if extent[2] < MIN_FLATNESS * extent[0]:
         raise CloudError(
             f"the cloud is {kind}: its smallest extent is {extent[2] / extent[0]:.1e} of its "
-            f"largest, at least {FLATTEST:g} is needed; a cloud of a whole object is needed"
+            f"largest, at least {MIN_FLATNESS:g} is needed; a cloud of a whole object is needed"
         )
 
 

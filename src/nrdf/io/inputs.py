@@ -12,8 +12,8 @@ import numpy as np
 
 from nrdf.errors import CloudError, DataError
 from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh
-from nrdf.geometry.units import unit_named
-from nrdf.io.cloud import PointCloud, read_cloud, unit_normals
+from nrdf.geometry.units import parse_unit
+from nrdf.io.cloud import PointCloud, drop_partial_normals, read_cloud
 from nrdf.io.formats.meshes import sample_mesh
 from nrdf.io.formats.raw import RawCloud
 
@@ -45,7 +45,7 @@ def as_cloud(given: Any, name: str = "the cloud", mesh_samples: int = MESH_SAMPL
     cloud = PointCloud(_rows(points, name), _normals(given, name), unit=_unit(given))
     if len(cloud) == 0:
         raise CloudError(f"{name} holds no points")
-    return unit_normals(name, cloud)
+    return drop_partial_normals(name, cloud)
 
 
 def _whole(scene: Any, name: str) -> Any:
@@ -100,4 +100,4 @@ def _normals(given: Any, name: str) -> np.ndarray | None:
 def _unit(given: Any) -> str | None:
     """The unit that trimesh's objects may name."""
     said = getattr(given, "units", None)
-    return unit_named(said) if isinstance(said, str) else None
+    return parse_unit(said) if isinstance(said, str) else None

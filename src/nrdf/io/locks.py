@@ -38,8 +38,8 @@ def write_lock(path: str | Path, wait: bool = False) -> Iterator[None]:
     """
     from filelock import FileLock, Timeout
 
-    place = resolved(path)
-    file, made = beside(place, "lock"), _missing(home(place))
+    place = resolve_links(path)
+    file, made = hidden_path(place, "lock"), _missing(lock_folder(place))
     lock = FileLock(file)
     try:
         with output_errors(path):
@@ -66,7 +66,7 @@ def write_lock(path: str | Path, wait: bool = False) -> Iterator[None]:
         _remove_empty(made)
 
 
-def resolved(path: str | Path) -> Path:
+def resolve_links(path: str | Path) -> Path:
     """`path` with all links followed. Raises OutputError for a name that no file can have."""
     try:
         place = Path(os.path.realpath(path))
@@ -77,7 +77,7 @@ def resolved(path: str | Path) -> Path:
         raise cannot_write(str(path).replace("\0", "\\0"), error) from None
 
 
-def home(place: Path) -> Path:
+def lock_folder(place: Path) -> Path:
     """The folder in which the lock of `place`, and what is not whole, lie.
 
     Its parent; itself for a folder that cannot be moved: a mount point, as containers have, or one
@@ -89,28 +89,28 @@ def home(place: Path) -> Path:
     return parent
 
 
-def beside(place: Path, ending: str) -> Path:
+def hidden_path(place: Path, ending: str) -> Path:
     """The name beside `place`, or in it, that ends in `ending`."""
-    return home(place) / f".{place.name}.{ending}"
+    return lock_folder(place) / f".{place.name}.{ending}"
 
 
-def new_token() -> str:
+def random_token() -> str:
     """What tells names of runs apart, alike in process number and time though they be."""
     return secrets.token_hex(4)
 
 
-def leftovers(place: Path, ending: str) -> list[Path]:
+def leftover_folders(place: Path, ending: str) -> list[Path]:
     """Folders `.NAME.TOKEN.ending` of `place`."""
     name = re.compile(rf"\.{re.escape(place.name)}\.{_TOKEN}\.{ending}")
-    return [path for path in _named(home(place), name) if stat.S_ISDIR(path.lstat().st_mode)]
+    return [path for path in _named(lock_folder(place), name) if stat.S_ISDIR(path.lstat().st_mode)]
 
 
 def _clear(place: Path) -> None:
     """Remove what killed runs left of `place`, and files in it that are not whole. What was set
     aside (`.old`) holds other people's files, and stays."""
-    for folder in leftovers(place, "tmp"):
+    for folder in leftover_folders(place, "tmp"):
         shutil.rmtree(folder, ignore_errors=True)
-    remove_partial_files(home(place), place.name)
+    remove_partial_files(lock_folder(place), place.name)
     if place.is_dir():
         remove_partial_files(place)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from nrdf.errors import OutputError
 from nrdf.io.atomic import output_errors
-from nrdf.io.locks import beside, new_token, resolved, write_lock
+from nrdf.io.locks import hidden_path, random_token, resolve_links, write_lock
 from nrdf.io.result_folder import REPORT, replace_folder, restore_folder, write_manifest
 
 log = logging.getLogger(__name__)
@@ -33,13 +33,13 @@ def output_folder(
     Raises OutputError if `path` is a file, is a folder that is not empty (without `overwrite`),
     holds one of the inputs, is being written by another run, or cannot be written.
     """
-    place, token = resolved(path), new_token()
+    place, token = resolve_links(path), random_token()
     if Path(path).is_symlink():
         log.info("%s is a link: the results go to %s", path, place)
     check_inputs(path, inputs)
     _check(path, overwrite=True)
     with write_lock(path):
-        temporary = beside(place, f"{token}.tmp")
+        temporary = hidden_path(place, f"{token}.tmp")
         try:
             with output_errors(path):
                 restore_folder(place)
@@ -86,7 +86,7 @@ def output_files(
     `output_file` does; both are as they were then.
     """
     with output_file(first, inputs), output_file(second, inputs):
-        temporary = beside(resolved(first), f"{new_token()}.tmp")
+        temporary = hidden_path(resolve_links(first), f"{random_token()}.tmp")
         try:
             with output_errors(first):
                 temporary.mkdir()
@@ -125,7 +125,7 @@ def _check(path: str | Path, overwrite: bool) -> None:
     path = Path(path)
     if path.exists() and not path.is_dir():
         raise OutputError(f"{path} is a file; --out needs a folder: give another name")
-    lock = beside(resolved(path), "lock").name
+    lock = hidden_path(resolve_links(path), "lock").name
     if not overwrite and path.is_dir() and any(p.name != lock for p in path.iterdir()):
         raise OutputError(
             f"the folder {path} exists and is not empty; give another one, or --overwrite to "

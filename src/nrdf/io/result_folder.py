@@ -19,7 +19,7 @@ from typing import NamedTuple
 from nrdf.errors import OutputError
 from nrdf.io.atomic import write_atomically
 from nrdf.io.files import read_file
-from nrdf.io.locks import beside, home, leftovers
+from nrdf.io.locks import hidden_path, leftover_folders, lock_folder
 
 log = logging.getLogger(__name__)
 
@@ -57,8 +57,8 @@ def replace_folder(place: Path, new: Path, token: str) -> None:
         return
     with suppress(OSError):
         os.chmod(new, stat.S_IMODE(place.stat().st_mode))
-    old = beside(place, f"{token}.old")
-    if home(place) == place or _holds_working_folder(place) or not _renamed(place, old):
+    old = hidden_path(place, f"{token}.old")
+    if lock_folder(place) == place or _holds_working_folder(place) or not _renamed(place, old):
         _move_in(new, place)
         return
     try:
@@ -75,7 +75,7 @@ def restore_folder(place: Path) -> None:
     What it set aside comes back where there is nothing in its place; else other people's files in
     it do. Raises OSError where that fails.
     """
-    for old in leftovers(place, "old"):
+    for old in leftover_folders(place, "old"):
         if os.path.lexists(place):
             log.info("%s: an earlier run was ended here; tidying up after it", place)
             _keep(old, place)

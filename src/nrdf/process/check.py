@@ -12,7 +12,7 @@ from nrdf.errors import ProcessError
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import distinct_points, downsample, indices_in_subset
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Process
@@ -88,8 +88,8 @@ def check_process(
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
     if process.trajectory != "taught" and stepover > width:
         warnings.append(
-            f"stepover_m is {stepover:g} ({in_words('stepover_m', stepover)}), more than the "
-            f"tool's width of {in_words('width_m', width)}: stripes between the lines are left out"
+            f"stepover_m is {stepover:g} ({readable('stepover_m', stepover)}), more than the "
+            f"tool's width of {readable('width_m', width)}: stripes between the lines are left out"
         )
     if process.kind in ("sand", "polish") and process.force_n is None:
         warnings.append(f"{process.kind} without force_n: the robot holds a position, not a force")
@@ -112,9 +112,9 @@ def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> No
     """Raise ProcessError for a spacing longer than the region, unless `allow_unusual` is set."""
     length = max(patch.extent[0] for patch in patches_of(surface, region))
     if process.spacing_m > length and not process.allow_unusual:
-        spacing = f"{process.spacing_m:g} ({in_words('spacing_m', process.spacing_m)})"
+        spacing = f"{process.spacing_m:g} ({readable('spacing_m', process.spacing_m)})"
         raise ProcessError(
-            f"spacing_m is {spacing}, longer than the region, {in_words('length_m', length)}; give "
+            f"spacing_m is {spacing}, longer than the region, {readable('length_m', length)}; give "
             "less, or set allow_unusual: true in the process"
         )
 

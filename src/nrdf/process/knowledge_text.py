@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from nrdf.geometry.units import OTHER_UNITS, in_words
+from nrdf.geometry.units import OTHER_UNITS, readable
 from nrdf.io.yaml_json import to_yaml_line
 from nrdf.process.knowledge import Knowledge
 
@@ -92,7 +92,7 @@ def _as_people_say(name: str, value: Any) -> str:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not any(name.endswith(si) for si, _ in OTHER_UNITS.values()):
         return ""
-    return in_words(name, float(value))
+    return readable(name, float(value))
 
 
 def _plain(value: Any) -> str:

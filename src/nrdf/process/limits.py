@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.io.bounds import FRACTION, NON_NEGATIVE
 from nrdf.process.transfer_result import FoundRegion, TransferResult
 from nrdf.regions.presence import ABSENT
@@ -104,6 +104,6 @@ class Limits:
              metrics.turn_worst_rad, self.max_turn_rad),
         ):  # fmt: skip
             if limit is not None and value is not None and value > limit:
-                excess = f"{in_words(name, value)}, above {in_words(name, limit)}"
+                excess = f"{readable(name, value)}, above {readable(name, limit)}"
                 lines.append(f"the {what} is {excess}")
         return lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.process.knowledge import Process
 from nrdf.toolpath.metrics import NO_CLEARANCE, ToolPathMetrics
 
@@ -20,7 +20,7 @@ def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     """What a person should look at before a path runs on a robot."""
     lines = []
     if metrics.left_out[NO_CLEARANCE] > 0.0:
-        clearance = in_words("clearance_m", process.tool.clearance_m)
+        clearance = readable("clearance_m", process.tool.clearance_m)
         lines.append(
             f"{metrics.left_out[NO_CLEARANCE]:.1%} of the region has less than {clearance} free "
             "before it, and is left out"
@@ -33,18 +33,18 @@ def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     worst, stepover = metrics.line_spacing_worst_m, process.distance_between_lines_m
     if process.trajectory != "taught" and worst is not None and worst > _WIDEST_LINES * stepover:
         lines.append(
-            f"lines are up to {in_words('spacing_m', worst)} apart; "
-            f"{in_words('stepover_m', stepover)} were asked for"
+            f"lines are up to {readable('spacing_m', worst)} apart; "
+            f"{readable('stepover_m', stepover)} were asked for"
         )
     if process.trajectory != "taught" and metrics.step_worst_m > _LARGEST_STEP * process.spacing_m:
-        step, requested = (in_words("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
+        step, requested = (readable("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
         lines.append(f"a step of {step} between neighbouring waypoints; {requested} were asked for")
     if metrics.turn_worst_rad > _LARGEST_TURN_RAD:
-        turn = in_words("_rad", metrics.turn_worst_rad)
+        turn = readable("_rad", metrics.turn_worst_rad)
         lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
     lines += _distance_warnings(process, metrics)
     if metrics.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
-        error = in_words("error_rad", metrics.axis_error_99_rad)
+        error = readable("error_rad", metrics.axis_error_99_rad)
         lines.append(f"1 % of the waypoints have a tool axis more than {error} off")
     return lines
 
@@ -53,9 +53,9 @@ def _distance_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     """By the object as it was given where that is known, else by the surface planned on."""
     planned, true = metrics.surface_distance_99_m, metrics.true_distance_99_m
     if true is not None and true > max(_FARTHEST_M, metrics.resolution_m or 0.0):
-        away = in_words("_m", true)
+        away = readable("_m", true)
         return [f"1 % of the way on the surface is more than {away} off {metrics.compared_with}"]
     if true is None and planned > _FARTHEST_M and process.trajectory != "taught":
-        away = in_words("_m", planned)
+        away = readable("_m", planned)
         return [f"1 % of the waypoints are more than {away} off the surface planned on"]
     return []

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, ConfigDict, Field, GetJsonSchemaHandler, mo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from nrdf.geometry.units import in_words, other_names, to_si
+from nrdf.geometry.units import accepted_names, readable, to_si
 from nrdf.io.schema import StrictModel
 
 _BOUNDS = ("minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum")
@@ -82,8 +82,8 @@ class PlausibleRange:
             return ""
         side, limit = ("below", self.least) if value < self.least else ("above", self.most)
         return (
-            f"{name} is {value:g} ({in_words(name, value)}), {side} what is plausible, "
-            f"{limit:g} ({in_words(name, limit)})"
+            f"{name} is {value:g} ({readable(name, value)}), {side} what is plausible, "
+            f"{limit:g} ({readable(name, limit)})"
         )
 
 
@@ -110,7 +110,7 @@ class Quantities(StrictModel):
     @classmethod
     def known_keys(cls) -> list[str]:
         fields = list(cls.model_fields)
-        return fields + [other for name in fields for other in other_names(name)]
+        return fields + [other for name in fields for other in accepted_names(name)]
 
     @model_validator(mode="before")
     @classmethod
@@ -128,7 +128,7 @@ class Quantities(StrictModel):
                 hint = f"Plausible: {plausible.least:.6g} to {plausible.most:.6g}."
                 description = properties[name].get("description", "")
                 properties[name]["description"] = f"{description} {hint}".strip()
-            for other, factor in other_names(name).items():
+            for other, factor in accepted_names(name).items():
                 properties[other] = _scaled(properties[name], 1 / factor)
                 properties[other]["description"] = f"Instead of {name}."
                 if name in schema.get("required", ()):

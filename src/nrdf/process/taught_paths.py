@@ -8,7 +8,7 @@ import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import z_axes
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.process.knowledge import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
 from nrdf.surface.surface import Surface
@@ -36,8 +36,8 @@ def taught_segments(process: Process, surface: Surface) -> tuple[Segment, ...]:
             worst = int(away.argmax())
             raise ProcessError(
                 f"waypoints: number {worst + 1} of line {number + 1} is "
-                f"{in_words('away_m', float(away[worst]))} from the reference; at most "
-                f"{in_words('allowed_m', allowed)} is allowed with standoff_m "
+                f"{readable('away_m', float(away[worst]))} from the reference; at most "
+                f"{readable('allowed_m', allowed)} is allowed with standoff_m "
                 f"{process.standoff_m:g}. Is it in the reference's frame, in metres?"
             )
         quaternions = _quaternions(line, positions, process, surface)

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.geometry.polylines import longest_step
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
@@ -265,8 +265,8 @@ class ProcessTransfer:
         longest, warped = (max(longest_step(s.positions) for s in of) for of in (here, there))
         if warped > _LONGER * longest:
             warnings.append(
-                f"a step of {in_words('_m', warped)} between neighbouring waypoints; the longest "
-                f"on the reference is {in_words('_m', longest)}"
+                f"a step of {readable('_m', warped)} between neighbouring waypoints; the longest "
+                f"on the reference is {readable('_m', longest)}"
             )
         normals = [segment.normals for segment in there]
         segments = add_approach_retract(there, normals, strategy_of(process))

@@ -9,7 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from nrdf.shapes.registration import Carriers, RegistrationSettings, RegistrationTemplate
+from nrdf.shapes.registration import (
+    DisplacementInterpolator,
+    RegistrationSettings,
+    RegistrationTemplate,
+)
 
 _POINTS = 2048  # of the reference, registered to twice as many of the target
 _SETTINGS = RegistrationSettings(
@@ -30,7 +34,7 @@ class Refiner:
         self._template = RegistrationTemplate(
             points[self._chosen], normals[self._chosen], _SETTINGS
         )
-        self._carriers = Carriers(points, self._chosen)
+        self._interpolator = DisplacementInterpolator(points, self._chosen)
 
     def displacement(
         self,
@@ -49,4 +53,4 @@ class Refiner:
         registered = self._template.register(
             target[sample], target_normals[sample], (begin, mapped_normals[self._chosen])
         )
-        return self._carriers.carry(registered.points - begin)
+        return self._interpolator.interpolate(registered.points - begin)

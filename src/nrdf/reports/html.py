@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.io.atomic import write_atomically
 from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
 from nrdf.viz.palette import region_colours
@@ -124,7 +124,7 @@ def _properties(path: Mapping[str, Any]) -> list[tuple[str, str]]:
     tool = requested["tool"]
 
     def quantity(name: str) -> str:
-        return in_words(name, requested[name]) if requested.get(name) is not None else "–"
+        return readable(name, requested[name]) if requested.get(name) is not None else "–"
 
     mode = "planned anew" if path["transfer"] == "replan" else "warped from the reference"
     lines = [("trajectory", f"{requested['trajectory']}, {mode}")]
@@ -134,7 +134,7 @@ def _properties(path: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("lines, waypoints", f"{path['lines']}, {path['waypoints']}"),
         ("stepover, spacing", f"{quantity('stepover_m')}, {quantity('spacing_m')}"),
         ("edge margin, passes", f"{quantity('edge_margin_m')}, {requested['passes']}"),
-        ("tool, radius", f"{tool['name']}, {in_words('radius_m', tool['radius_m'])}"),
+        ("tool, radius", f"{tool['name']}, {readable('radius_m', tool['radius_m'])}"),
         ("lead, tilt, stand-off",
          f"{quantity('lead_rad')}, {quantity('tilt_rad')}, {quantity('standoff_m')}"),
         ("force, feed", f"{quantity('force_n')}, {quantity('feed_m_s')}"),

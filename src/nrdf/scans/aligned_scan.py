@@ -93,9 +93,9 @@ class AlignedScan:
             )
         if self.alignment.best.symmetry == 0:
             found.append("no mirror plane was found, so yaw and scale are rough; scan more sides")
-        if self.unit.doubt:
+        if self.unit.warning:
             known = "may be wrong" if self.unit.name else "is unknown"
-            found.append(f"the unit {known}: {self.unit.doubt}")
+            found.append(f"the unit {known}: {self.unit.warning}")
         return found
 
 

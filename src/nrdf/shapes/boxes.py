@@ -164,9 +164,9 @@ def _part(boxes: dict[str, np.ndarray], index: int, keys: tuple[str, ...]) -> li
     return [boxes[key][start:end] for key in keys]
 
 
-def _shape(name: str, category: str, solid: Boxes) -> Shape:
+def _shape(name: str, category: str, boxes: Boxes) -> Shape:
     rng = np.random.default_rng(list(name.encode()))
-    points, normals = solid.sample_surface(SURFACE_POINTS, rng)
+    points, normals = boxes.sample_surface(SURFACE_POINTS, rng)
     queries = occupancy_queries(points, QUERIES, rng)
     return Shape(
         name=name,
@@ -175,5 +175,5 @@ def _shape(name: str, category: str, solid: Boxes) -> Shape:
         surface_points=points,
         surface_normals=normals,
         query_points=queries,
-        query_occupancies=solid.occupancy(queries.astype(np.float64)),
+        query_occupancies=boxes.occupancy(queries.astype(np.float64)),
     )

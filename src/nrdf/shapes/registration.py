@@ -1,11 +1,11 @@
-"""Smooth non-rigid registration of two oriented point clouds: the teacher of the default field.
+"""Smooth non-rigid registration of two oriented point clouds: the source of correspondences.
 
 Nothing is learned here. A template is moved, starting half-way between its own place and its
 bounding box copy, so that nearest neighbours taken both ways in (position, weighted normal) agree,
 while displacements are averaged over template neighbourhoods that shrink from coarse to fine
 (coherent-point-drift-like smoothing: Myronenko & Song 2010; normals tell the two sides of a thin
 part apart). It takes a fraction of a second a pair and gives dense pseudo-correspondences between
-*training* shapes, which `nrdf.shapes.correspond` stores and training distils into the field.
+*training* shapes, which `nrdf.shapes.correspond` stores and training learns from.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 Array = np.ndarray
-_CARRIERS = 4
+_NEIGHBOURS = 4
 
 
 @dataclass(frozen=True)
@@ -115,20 +115,20 @@ class RegistrationTemplate:
         return (1 - self.settings.start) * self.points + self.settings.start * box_copy
 
 
-class Carriers:
-    """What moves a subset of points carries all of them along.
+class DisplacementInterpolator:
+    """Displacements of all points from those of a subset.
 
-    points: (n, 3); chosen: (k,) indices of the subset. Each point goes with its `_CARRIERS` nearest
-    of the subset, weighted by the inverse square of the distance.
+    points: (n, 3); chosen: (k,) indices of the subset. Each point moves like its `_NEIGHBOURS`
+    nearest of the subset, weighted by the inverse square of the distance.
     """
 
     def __init__(self, points: Array, chosen: Array) -> None:
-        count = min(_CARRIERS, len(chosen))
+        count = min(_NEIGHBOURS, len(chosen))
         distance, self._nearest = cKDTree(points[chosen]).query(points, range(1, count + 1))
         weight = 1.0 / (distance + 1e-3) ** 2
         self._weight = weight / weight.sum(axis=1, keepdims=True)
 
-    def carry(self, displacement: Array) -> Array:
+    def interpolate(self, displacement: Array) -> Array:
         """Displacements (n, 3) of all points from those of the subset, (k, 3)."""
         return np.einsum("nk,nka->na", self._weight, displacement[self._nearest])
 

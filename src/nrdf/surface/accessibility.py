@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.units import in_words
-from nrdf.geometry.winding import Winding
+from nrdf.geometry.units import readable
+from nrdf.geometry.winding import WindingNumber
 from nrdf.surface.surface import Surface
 
 _STEP_M, _MOST_STEPS = 0.005, 200
@@ -30,7 +30,7 @@ def accessible_points(surface: Surface, region: np.ndarray, clearance_m: float) 
     if not len(free):
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
-            f"{in_words('clearance_m', clearance_m)} free before the surface; give less, or 0"
+            f"{readable('clearance_m', clearance_m)} free before the surface; give less, or 0"
         )
     return np.asarray(free)
 
@@ -41,7 +41,7 @@ def _blocked(surface: Surface, clearance_m: float) -> np.ndarray:
     far = min(clearance_m, float(np.linalg.norm(np.ptp(surface.points, axis=0))))
     heights = np.linspace(0.0, far, int(np.clip(np.ceil(far / _STEP_M), 1, _MOST_STEPS)) + 1)[1:]
     before = surface.points[:, None] + heights[:, None] * surface.normals[:, None]
-    winding = Winding(surface.points, surface.normals)
+    winding = WindingNumber(surface.points, surface.normals)
     wound = winding(before.reshape(-1, 3), order=1)
     blocked = np.asarray((wound.reshape(len(before), -1) > _INSIDE).any(axis=1))
     # A sum of many points fails here and there: a point alone is no crevice.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.units import in_words
+from nrdf.geometry.units import readable
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch
 from nrdf.toolpath.strategy import Strategy
@@ -72,13 +72,13 @@ def estimate_size(patches: Sequence[Patch], strategy: Strategy) -> PlanSize:
 def check_size(patches: Sequence[Patch], strategy: Strategy) -> None:
     """Raise ProcessError, saying what would be planned, for more than can be."""
     size = estimate_size(patches, strategy)
-    stepover = f"stepover_m {strategy.stepover_m:g} ({in_words('_m', strategy.stepover_m)})"
+    stepover = f"stepover_m {strategy.stepover_m:g} ({readable('_m', strategy.stepover_m)})"
     region = f"on the region's {size.area:.3g} m²"
     if size.waypoints > MOST_WAYPOINTS or size.lines > MOST_LINES:
         raise ProcessError(
             f"about {_round(size.waypoints)} waypoints on {_round(size.lines)} lines would be "
             f"planned {region}, with {stepover}, spacing_m {strategy.spacing_m:g} "
-            f"({in_words('_m', strategy.spacing_m)}) and passes {strategy.passes}; at most "
+            f"({readable('_m', strategy.spacing_m)}) and passes {strategy.passes}; at most "
             f"{_round(MOST_WAYPOINTS)} on {_round(MOST_LINES)} are. Give more stepover_m or "
             "spacing_m, fewer passes, or cut the region into several"
         )
@@ -89,7 +89,7 @@ def check_size(patches: Sequence[Patch], strategy: Strategy) -> None:
             "Give more, or cut the region into several"
         )
     if size.samples > _MOST_PLACES or size.pairs > _MOST_PAIRS:
-        radius = f"{strategy.tool_radius_m:g} ({in_words('_m', strategy.tool_radius_m)})"
+        radius = f"{strategy.tool_radius_m:g} ({readable('_m', strategy.tool_radius_m)})"
         raise ProcessError(
             f"tool.radius_m {radius} does not go with {stepover} {region}: lines of about "
             f"{_round(size.length)} m would have to be looked at {_round(size.samples)} times to "

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from nrdf.errors import ConfigError, ModelError, OutputError
 from nrdf.field.zoo import WEIGHTS
 from nrdf.io.atomic import write_atomically
-from nrdf.io.locks import new_token
+from nrdf.io.locks import random_token
 
 FOLDER = "checkpoints"
 IDENTITY = "run.json"
@@ -53,7 +53,7 @@ def save_checkpoint(
     final = run / FOLDER / f"step-{position.total:09d}"
     if final.exists():
         return  # it is whole, and a run always comes to the same
-    temporary = run / FOLDER / f".{final.name}.{new_token()}.tmp"
+    temporary = run / FOLDER / f".{final.name}.{random_token()}.tmp"
     try:
         temporary.mkdir(parents=True)
         save_file(_plain(field.state_dict()), temporary / "field.safetensors")

@@ -79,13 +79,13 @@ def render(
     pixels: float,
     shape: tuple[int, int],
     table: np.ndarray,
-    inks: np.ndarray,
+    line_colours: np.ndarray,
 ) -> np.ndarray:
     """One cloud on white, (h, w, 3) in [0, 1] with the lowest row first, h and w by `shape`.
 
     axes: rows right, up, towards the viewer (3, 3). `corner` (2,) is the place of the first pixel's
     corner, `pixels` their number per unit length. table: a colour for each region's number, the
-    last for none; inks: the same for lines.
+    last for none; line_colours: the same for lines.
     """
     shape, pixels = (_OVERSAMPLING * shape[0], _OVERSAMPLING * shape[1]), _OVERSAMPLING * pixels
     front = np.flatnonzero(cloud.normals @ axes[2] > 0.0)
@@ -107,7 +107,7 @@ def render(
         # A line may dip into its own region, but does not shine through a thin part's other side.
         own = (owner >= 0) & (cloud.region[owner] == lines.region)
         cover = depth - np.where(own, np.float32(_SUNK), np.float32(0.0))
-        _paint(image, cover, lines.lines, inks[lines.region], axes, corner, pixels)
+        _paint(image, cover, lines.lines, line_colours[lines.region], axes, corner, pixels)
     steps = range(_OVERSAMPLING)
     parts = [image[i::_OVERSAMPLING, j::_OVERSAMPLING] for i in steps for j in steps]
     return np.clip(np.add.reduce(parts) / np.float32(len(parts)), 0.0, 1.0)
@@ -158,7 +158,7 @@ def _paint(
     image: np.ndarray,
     cover: np.ndarray,
     lines: Sequence[np.ndarray],
-    ink: np.ndarray,
+    colour: np.ndarray,
     axes: np.ndarray,
     corner: np.ndarray,
     pixels: float,
@@ -179,7 +179,7 @@ def _paint(
         which, at = np.nonzero(inside)
         x, y = x[which, at], y[which, at]
         seen = view[which, 2] > cover[y, x]
-        image[y[seen], x[seen]] = ink
+        image[y[seen], x[seen]] = colour
 
 
 def _close_pinholes(

@@ -15,7 +15,7 @@ from nrdf.geometry.sampling import fibonacci_directions
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.association import nearest_voters, snap
 from nrdf.regions.region import region_indices
-from nrdf.shapes.registration import Carriers, RegistrationTemplate
+from nrdf.shapes.registration import DisplacementInterpolator, RegistrationTemplate
 
 SEED = 0
 TEMPLATE_POINTS = 2048
@@ -104,14 +104,14 @@ class _Template:
         self.points, self.normals = points, normals
         self.chosen = np.random.default_rng(SEED).permutation(len(points))[:TEMPLATE_POINTS]
         self.registered = RegistrationTemplate(points[self.chosen], normals[self.chosen])
-        self.carriers = Carriers(points, self.chosen)
+        self.interpolator = DisplacementInterpolator(points, self.chosen)
 
     def map_surface(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Where the reference's points arrive on a target (m, 3) with normals: (n, 3)."""
         rng = np.random.default_rng(SEED + 1)
         sample = rng.permutation(len(points))[: 2 * TEMPLATE_POINTS]
         arrived = self.registered.register(points[sample], normals[sample]).points
-        return self.points + self.carriers.carry(arrived - self.points[self.chosen])
+        return self.points + self.interpolator.interpolate(arrived - self.points[self.chosen])
 
 
 def hidden_point_normals(points: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import trimesh
 
 from nrdf.errors import CloudError
 from nrdf.io.cloud import read_cloud
-from nrdf.io.formats.mesh_claims import check_claims, off_counts
+from nrdf.io.formats.mesh_claims import check_claimed_sizes, off_counts
 
 
 def test_a_mesh_ply_with_a_wrong_face_count_is_refused(tmp_path):
@@ -47,14 +47,14 @@ def test_a_scene_that_claims_too_much_is_refused(tmp_path, scene, message):
     path = tmp_path / "a.gltf"
     path.write_text(json.dumps(scene))
     with open(path, "rb") as file, pytest.raises(ValueError, match=message):
-        check_claims(path, file)
+        check_claimed_sizes(path, file)
 
 
 def test_claims_that_hold_pass(tmp_path):
     path = tmp_path / "a.gltf"
     path.write_text(json.dumps(gltf()))
     with open(path, "rb") as file:
-        check_claims(path, file)
+        check_claimed_sizes(path, file)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from typing import BinaryIO, cast
 import numpy as np
 
 from nrdf.errors import CloudError, NrdfError
-from nrdf.geometry.units import METRES, unit_named
+from nrdf.geometry.units import METRES, parse_unit
 from nrdf.io.files import open_file
 from nrdf.io.formats.raw import MAX_UNPACKED_BYTES, RawCloud, colours_of
 from nrdf.io.formats.tables import table_cloud
@@ -58,9 +58,9 @@ def read_npz(path: Path, _: int) -> RawCloud:
                 if shape != () or kind.kind != "U" or kind.itemsize > _LONGEST_WORD:
                     raise ValueError(f"'{name}' must be a word, not {shape} of {kind}")
                 setattr(cloud, name, str(arrays.load(f"{prefix}{name}")))
-        if cloud.unit and unit_named(cloud.unit) is None:
+        if cloud.unit and parse_unit(cloud.unit) is None:
             raise ValueError(f"its unit is '{cloud.unit}'; known: {', '.join(METRES)}")
-        cloud.unit = unit_named(cloud.unit or "")
+        cloud.unit = parse_unit(cloud.unit or "")
     return cloud
 
 

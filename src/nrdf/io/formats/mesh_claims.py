@@ -27,7 +27,7 @@ _POINTS_FOR_A_FACE = 20  # lone points that take as much memory as a face
 _DEEPEST = 200  # nodes above each other in a scene
 
 
-def check_claims(path: Path, file: BinaryIO) -> None:
+def check_claimed_sizes(path: Path, file: BinaryIO) -> None:
     """Raise ValueError or CloudError if the open mesh file claims what it cannot hold, or more than
     is read. The place in the file may move."""
     size = os.fstat(file.fileno()).st_size

@@ -11,7 +11,7 @@ import numpy as np
 from nrdf.errors import DataError, NrdfError
 from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh
 from nrdf.io.files import open_file, read_file
-from nrdf.io.formats.mesh_claims import check_claims
+from nrdf.io.formats.mesh_claims import check_claimed_sizes
 
 MESH_ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
 _MOST_BESIDE = 250_000_000  # bytes of a file that a mesh names
@@ -33,7 +33,7 @@ def load_mesh(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         raise DataError(f"{path}: no mesh that can be read; known: {', '.join(MESH_ENDINGS)}")
     with open_file(path, DataError) as file:
         try:
-            check_claims(path, file)
+            check_claimed_sizes(path, file)
             file.seek(0)
             if file.read(3) != b"\xef\xbb\xbf":  # a byte-order mark hides the first line
                 file.seek(0)

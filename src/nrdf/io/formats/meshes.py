@@ -16,7 +16,7 @@ import numpy as np
 from nrdf.errors import CloudError, DataError
 from nrdf.geometry.mesh import Mesh, outer_skin
 from nrdf.io.files import open_file
-from nrdf.io.formats.mesh_claims import check_claims, off_counts
+from nrdf.io.formats.mesh_claims import check_claimed_sizes, off_counts
 from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.io.formats.raw import RawCloud
 from nrdf.io.rows import text_rows
@@ -86,7 +86,7 @@ def read_glb(path: Path, samples: int) -> RawCloud:
 
     with open_file(path, CloudError) as file:
         try:
-            check_claims(path.with_suffix(".glb"), file)
+            check_claimed_sizes(path.with_suffix(".glb"), file)
             file.seek(0)
             scene = trimesh.load_scene(file, file_type="glb", process=False, skip_materials=True)
             parts: list[Any] = scene.dump() if scene.geometry else []

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from nrdf.errors import CloudError
-from nrdf.geometry.units import METRES, unit_named
+from nrdf.geometry.units import METRES, parse_unit
 from nrdf.io import ply
 from nrdf.io.formats import meshes
 from nrdf.io.formats.raw import USED, RawCloud, colours_of, intensity_of, stack
@@ -34,7 +34,7 @@ def read_ply(path: Path, mesh_samples: int) -> RawCloud:
     for comment in header.comments:
         word, _, rest = comment.partition(" ")
         if word == "unit" and len(rest.split()) == 1:
-            cloud.unit = unit_named(rest)
+            cloud.unit = parse_unit(rest)
             if cloud.unit is None:
                 known = ", ".join(METRES)
                 logger.warning("%s: its unit '%s' is not known (%s)", path, rest.strip(), known)

@@ -12,7 +12,7 @@ from typing import BinaryIO
 import numpy as np
 
 from nrdf.errors import CloudError
-from nrdf.geometry.units import METRES, unit_named
+from nrdf.geometry.units import METRES, parse_unit
 from nrdf.io.files import open_file
 from nrdf.io.formats.raw import RawCloud, colours_of, intensity_of, stack
 
@@ -189,7 +189,7 @@ def _columns(path: Path, start: _Start) -> _Columns | None:
         )
     if not any(units.values()):
         return _Columns(names, None, np.ones(3))
-    known = [unit_named(units[axis]) for axis in "xyz"]
+    known = [parse_unit(units[axis]) for axis in "xyz"]
     lengths = [METRES[unit] for unit in known if unit is not None]
     if len(lengths) < 3:
         said = ", ".join(f"{axis} [{units[axis]}]" for axis in "xyz")

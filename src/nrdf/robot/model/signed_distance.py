@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import RobotError
 from nrdf.geometry.sampling import downsample
-from nrdf.geometry.winding import Winding, mesh_winding_numbers
+from nrdf.geometry.winding import WindingNumber, mesh_winding_numbers
 
 CELL_M = 0.008
 MARGIN_M = 0.20
@@ -89,7 +89,7 @@ def distance_field_from_points(points: np.ndarray, normals: np.ndarray) -> Signe
     normals = np.ascontiguousarray(normals[kept], dtype=np.float64)
     tree = cKDTree(points)
     grid = _Grid.around(points)
-    value = grid.filled(tree, Winding(points, normals))
+    value = grid.filled(tree, WindingNumber(points, normals))
     vertices, faces = grid.level_set(value)
     # Where points are sparse the level set bulges; the nearest point's plane does not.
     far, nearest = tree.query(vertices, 4)
