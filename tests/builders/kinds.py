@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from nrdf.field.kind_network import ANSWERS
+from nrdf.field.kind_network import CLASSES
 from nrdf.shapes.families import get_family
 
 
@@ -20,7 +20,7 @@ class Saying:
     """A network that answers one thing."""
 
     def __init__(self, answer: int, sure: float = 0.9) -> None:
-        self.told = np.full(ANSWERS, (1 - sure) / (ANSWERS - 1))
+        self.told = np.full(CLASSES, (1 - sure) / (CLASSES - 1))
         self.told[answer] = sure
 
     def probabilities(self, points):

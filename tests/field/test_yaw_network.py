@@ -8,7 +8,7 @@ import torch
 
 from builders.step_shape import step_cloud
 from nrdf.field import yaw_network as yaws
-from nrdf.field.yaw_network import YawNetwork, log_probability_at, turn
+from nrdf.field.yaw_network import YawNetwork, log_probability_at, yaw_rotations
 from nrdf.field.zoo import list_models
 from nrdf.geometry.canonical import MIRROR, rotation_about_up
 
@@ -43,7 +43,7 @@ def test_between_its_bins_a_distribution_is_interpolated():
 
 
 def test_turning_is_about_up_as_elsewhere():
-    np.testing.assert_allclose(turn(torch.tensor(0.7)), rotation_about_up(0.7), atol=1e-6)
+    np.testing.assert_allclose(yaw_rotations(torch.tensor(0.7)), rotation_about_up(0.7), atol=1e-6)
 
 
 def test_what_ships_is_whole_and_small():

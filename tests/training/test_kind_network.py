@@ -114,7 +114,7 @@ def test_what_was_trained_tells_steps_from_balls_and_which_way_they_stand(traine
 def test_data_that_do_not_serve_are_refused(folders, tmp_path, untrained):
     with pytest.raises(DataError, match="is of the category 'step', not 'chair'"):
         train_kind("chair", [folders[0]], [], tmp_path / "run", settings=FEW)
-    with pytest.raises(ModelError, match="holds weights of preset 'default', not what tells"):
+    with pytest.raises(ModelError, match="holds weights of preset 'default', not of a network"):
         load_kind_network(untrained)
 
 

@@ -12,7 +12,7 @@ import torch
 from builders.step_shape import step_cloud
 from nrdf.errors import DataError, ModelError
 from nrdf.field import yaw_network
-from nrdf.field.yaw_network import load_yaw_network, turn
+from nrdf.field.yaw_network import load_yaw_network, yaw_rotations
 from nrdf.field.zoo import add_to_zoo, list_models
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.shapes.dataset import IndexRow, write_index
@@ -37,7 +37,7 @@ def test_drawn_clouds_are_what_cameras_see_turned_by_their_yaw(folder):
     assert (views.bits[0][below] == 0).all(), "no camera sees the underside"
     generator = torch.Generator().manual_seed(0)
     points, normals, yaw = draw(views, torch.zeros(32, dtype=torch.long), 200, 0.0, generator)
-    back = torch.einsum("bij,bni->bnj", turn(yaw), points)
+    back = torch.einsum("bij,bni->bnj", yaw_rotations(yaw), points)
     # The higher block is behind, whatever was seen, and in all that were turned back.
     high = back[..., 1] > 0.17
     assert high.any(1).sum() > 28 and (back[..., 0][high] < 0.05).all()

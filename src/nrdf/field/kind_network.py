@@ -1,9 +1,9 @@
-"""Is this an object of the category, upright and facing forward: a small network that tells.
+"""A small network that classifies a cloud: of the category, and how oriented, or of another kind.
 
-A set abstraction and a maximum over it (PointNet++, Qi et al. 2017) end in 32 answers: the object
+A set abstraction and a maximum over it (PointNet++, Qi et al. 2017) end in 32 classes: the object
 in one of 24 orientations that take axes to axes, turned by some other angle about one of six
-directions that may be up, tilted, or no object of the category. It is asked about the cloud in four
-turns and about their mirror images, and the answers, turned back, are put together.
+directions that may be up, tilted, or no object of the category. The network sees the cloud at four
+yaws, each with its mirror image; the outputs, brought back to the cloud itself, are averaged.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ UPS = np.array([up_axis(name) for name in AXES])
 """(6, 3) directions that an object's up may have."""
 ORIENTATIONS = np.round(
     [
-        upright(up) @ rotation_about_up(np.pi / 2 * turn)
+        upright(up) @ rotation_about_up(np.pi / 2 * quarter)
         for up in UPS[[1, 0, 2, 3, 4, 5]]
-        for turn in range(4)
+        for quarter in range(4)
     ]
 )
 """(24, 3, 3) rotations of an object from the canonical frame that take axes to axes, the first one
-none at all. They are the answers 0 to 23."""
+the identity. They are the classes 0 to 23."""
 ASKEW = 24
-"""The first of six answers: the object's up is `UPS[answer - ASKEW]`, its heading along no axis."""
+"""The first of six classes: the object's up is `UPS[kind - ASKEW]`, its heading along no axis."""
 TILTED, OTHER = 30, 31
-"""Answers: an object of the category, its up along no axis; no object of the category."""
-ANSWERS = 32
+"""Classes: an object of the category, its up along no axis; no object of the category."""
+CLASSES = 32
 
 
 class KindConfig(FieldConfig):
@@ -53,7 +53,7 @@ class KindConfig(FieldConfig):
 
 
 class KindNetwork(nn.Module):
-    """Logits over the answers for clouds in any place and unit."""
+    """Logits over the classes for clouds in any place and unit."""
 
     preset: ClassVar[str] = KIND
 
@@ -64,11 +64,11 @@ class KindNetwork(nn.Module):
         self.local = nn.Sequential(*_layer(6, 48), *_layer(48, local))
         self.patches = nn.Sequential(*_layer(local + 3, width), *_layer(width, width + 64))
         self.head = nn.Sequential(
-            *_layer(2 * (width + 64), width), nn.Dropout(0.2), nn.Linear(width, ANSWERS)
+            *_layer(2 * (width + 64), width), nn.Dropout(0.2), nn.Linear(width, CLASSES)
         )
 
     def forward(self, points: Tensor) -> Tensor:
-        """(b, ANSWERS) logits for clouds (b, n, 3), whose points are in random order."""
+        """(b, CLASSES) logits for clouds (b, n, 3), whose points are in random order."""
         low, high = points.amin(1, keepdim=True), points.amax(1, keepdim=True)
         points = (points - (low + high) / 2) / (high - low).amax(2, keepdim=True)
         centres = points[:, : self.config.centres]
@@ -76,55 +76,57 @@ class KindNetwork(nn.Module):
         rows = torch.arange(len(points), device=points.device)[:, None, None]
         place = points[rows, index]
         near = torch.cat([4 * (place - centres[:, :, None]), place], dim=-1)
-        felt = self.local(near.flatten(0, 2)).view(*near.shape[:3], -1).amax(2)
-        told = torch.cat([felt, centres], dim=-1)
-        seen = self.patches(told.flatten(0, 1)).view(*told.shape[:2], -1)
-        return self.head(torch.cat([seen.amax(1), seen.mean(1)], dim=-1))
+        local = self.local(near.flatten(0, 2)).view(*near.shape[:3], -1).amax(2)
+        local = torch.cat([local, centres], dim=-1)
+        patches = self.patches(local.flatten(0, 1)).view(*local.shape[:2], -1)
+        return self.head(torch.cat([patches.amax(1), patches.mean(1)], dim=-1))
 
     @torch.inference_mode()
     def probabilities(self, points: np.ndarray) -> np.ndarray:
-        """(ANSWERS,) of a cloud (n, 3) in any place and unit, its points in random order.
+        """(CLASSES,) of a cloud (n, 3) in any place and unit, its points in random order.
 
-        As many points are looked at as make up one of the clouds that the network was trained on
-        for each time it is asked, or the same ones again where there are fewer.
+        Each of the eight views of the cloud takes other points of it, as many as the network was
+        trained with; the same ones again where there are fewer.
         """
         count = self.config.points
-        clouds = max(1, min(len(_SHOWN), len(points) // count))
+        clouds = max(1, min(len(_VIEWS), len(points) // count))
         split = np.array_split(points[: clouds * count], clouds)
-        shown = [split[i % clouds] @ turn.T for i, turn in enumerate(_SHOWN)]
-        told = self(torch.as_tensor(np.stack(shown), dtype=torch.float32)).log_softmax(1).numpy()
-        mean = np.mean([row[answer] for row, answer in zip(told, _ANSWERED, strict=True)], axis=0)
+        shown = [split[i % clouds] @ view.T for i, view in enumerate(_VIEWS)]
+        logits = self(torch.as_tensor(np.stack(shown), dtype=torch.float32)).log_softmax(1).numpy()
+        mean = np.mean([row[of] for row, of in zip(logits, _CLASS_IN_VIEW, strict=True)], axis=0)
         likely = np.exp(mean - mean.max())
         return np.asarray(likely / likely.sum())
 
 
 def orientation_of(rotation: np.ndarray) -> int:
-    """The answer for an object turned by a rotation (3, 3) that takes axes to axes."""
+    """The class of an object turned by a rotation (3, 3) that takes axes to axes."""
     return int(np.abs(ORIENTATIONS - rotation).sum(axis=(1, 2)).argmin())
 
 
-def up_of(answer: int) -> np.ndarray | None:
-    """Where the object's up (3,) is, by an answer; None where that does not tell."""
-    if answer >= TILTED:
+def up_of(kind: int) -> np.ndarray | None:
+    """Direction (3,) of the object's up, by its class; None where the class does not tell it."""
+    if kind >= TILTED:
         return None
-    return UPS[answer - ASKEW] if answer >= ASKEW else ORIENTATIONS[answer] @ UPS[1]
+    return UPS[kind - ASKEW] if kind >= ASKEW else ORIENTATIONS[kind] @ UPS[1]
 
 
-def _answers(shown: np.ndarray) -> np.ndarray:
-    """Which answer about a cloud that was moved by `shown` (3, 3), a turn, perhaps mirrored, is
-    each of the answers about the cloud itself: (ANSWERS,)."""
-    mirror = np.diag(MIRROR) if np.linalg.det(shown) < 0 else np.eye(3)
-    turned = [orientation_of(shown @ rotation @ mirror) for rotation in ORIENTATIONS]
-    ups = [ASKEW + int((UPS @ (shown @ up)).argmax()) for up in UPS]
+def _class_in_view(view: np.ndarray) -> np.ndarray:
+    """The class (CLASSES,) that a cloud of each class has in a view of it.
+
+    view: (3, 3), a rotation about up, perhaps of the mirror image.
+    """
+    mirror = np.diag(MIRROR) if np.linalg.det(view) < 0 else np.eye(3)
+    turned = [orientation_of(view @ rotation @ mirror) for rotation in ORIENTATIONS]
+    ups = [ASKEW + int((UPS @ (view @ up)).argmax()) for up in UPS]
     return np.array([*turned, *ups, TILTED, OTHER])
 
 
-_SHOWN = [
-    rotation_about_up(np.pi / 2 * turn) @ side
-    for turn in range(4)
+_VIEWS = [
+    rotation_about_up(np.pi / 2 * quarter) @ side
+    for quarter in range(4)
     for side in (np.eye(3), np.diag(MIRROR))
 ]
-_ANSWERED = [_answers(shown) for shown in _SHOWN]
+_CLASS_IN_VIEW = [_class_in_view(view) for view in _VIEWS]
 
 
 def load_kind_network(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwork, dict[str, Any]]:
@@ -136,8 +138,8 @@ def load_kind_network(name: str | Path, zoo: Path = KIND_ZOO) -> tuple[KindNetwo
     metadata, tensors = load_tensors(path)
     if metadata.get("preset") != KIND:
         raise ModelError(
-            f"{path} holds weights of preset '{metadata.get('preset')}', not what tells a kind of "
-            "object; `nrdf model kind` trains what is needed here"
+            f"{path} holds weights of preset '{metadata.get('preset')}', not of a network "
+            "for the kind of object; `nrdf model kind` trains what is needed here"
         )
     with torch.random.fork_rng(devices=[]):
         network = KindNetwork(KindConfig(**metadata["field"]))

@@ -1,8 +1,8 @@
-"""Which way an object faces: a small network that tells yaw from a cloud whose up is known.
+"""A small network that estimates the yaw of an object from a cloud whose up is known.
 
 A set abstraction and a maximum over it (PointNet++, Qi et al. 2017) end in a distribution over the
-full circle of yaws. It is asked about the cloud in several turns and about its mirror image, and
-the answers, turned back, are put together: what the network learned of one direction counts in all.
+full circle of yaws. The network sees the cloud at several yaws, each with its mirror image; the
+outputs, turned back, are averaged: what it learned of one direction counts in all.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from nrdf.field.zoo import YAW, ZOO, find_weights, list_models
 
 YAW_ZOO = ZOO / YAW
 """Folder of the networks that ship, with an index of its own; a network's name is its category."""
-_TURNS = 6  # in which a cloud is shown, each as it is and mirrored
+_VIEWS = 6  # yaws at which a cloud is shown, each as it is and mirrored
 _CLOUDS = 2  # of different points, likewise
 _FAR = 0.95  # share of the points whose distance from their middle is the unit of length
 
@@ -58,15 +58,15 @@ class YawNetwork(nn.Module):
         yaw 2π i / bins about +Y. The points are in random order, in any unit."""
         points = _normalised(points)
         count, neighbours = self.config.centres, self.config.neighbours
-        centres, lines = points[:, :count], normals[:, :count]
+        centres, centre_normals = points[:, :count], normals[:, :count]
         index = torch.cdist(centres, points).topk(neighbours, dim=2, largest=False).indices
         rows = torch.arange(len(points), device=points.device)[:, None, None]
         offset = 4 * (points[rows, index] - centres[:, :, None])
         near = torch.cat([offset, normals[rows, index], points[rows, index][..., 1:2]], dim=-1)
-        felt = self.local(near.flatten(0, 2)).view(*near.shape[:3], -1).amax(2)
-        told = torch.cat([felt, centres, lines], dim=-1)
-        seen = self.patches(told.flatten(0, 1)).view(*told.shape[:2], -1)
-        return self.head(torch.cat([seen.amax(1), seen.mean(1)], dim=-1))
+        local = self.local(near.flatten(0, 2)).view(*near.shape[:3], -1).amax(2)
+        local = torch.cat([local, centres, centre_normals], dim=-1)
+        patches = self.patches(local.flatten(0, 1)).view(*local.shape[:2], -1)
+        return self.head(torch.cat([patches.amax(1), patches.mean(1)], dim=-1))
 
     @torch.inference_mode()
     def log_probability(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -81,12 +81,12 @@ class YawNetwork(nn.Module):
             torch.as_tensor(v[: clouds * count], dtype=torch.float32).reshape(clouds, -1, 3)
             for v in (points, normals)
         )
-        steps = [bins // _TURNS * i for i in range(_TURNS)]
-        turns = turn(2 * math.pi / bins * torch.tensor(steps))
-        p, n = (torch.einsum("tij,cnj->tcni", turns, v) for v in (p, n))
+        steps = [bins // _VIEWS * i for i in range(_VIEWS)]
+        rotations = yaw_rotations(2 * math.pi / bins * torch.tensor(steps))
+        p, n = (torch.einsum("tij,cnj->tcni", rotations, v) for v in (p, n))
         mirror = torch.tensor([1.0, 1.0, -1.0])
         shown = [torch.stack([v, v * mirror], 1).flatten(0, 2) for v in (p, n)]
-        logits = self(*shown).log_softmax(1).view(_TURNS, 2, clouds, bins)
+        logits = self(*shown).log_softmax(1).view(_VIEWS, 2, clouds, bins)
         # A mirror image faces minus the yaw.
         logits[:, 1] = logits[:, 1].flip(-1).roll(1, -1)
         turned = [
@@ -97,7 +97,7 @@ class YawNetwork(nn.Module):
         return torch.cat(turned).mean(0).log_softmax(0).numpy()
 
 
-def turn(yaw: Tensor) -> Tensor:
+def yaw_rotations(yaw: Tensor) -> Tensor:
     """Rotations (..., 3, 3) by `yaw` (...) (rad) about +Y."""
     c, s, zero = yaw.cos(), yaw.sin(), torch.zeros_like(yaw)
     rows = [[c, zero, s], [zero, zero + 1, zero], [-s, zero, c]]
@@ -142,7 +142,7 @@ def _layer(given: int, wanted: int) -> list[nn.Module]:
 
 
 def _normalised(points: Tensor) -> Tensor:
-    """Points (b, n, 3) about their middle, heights above the lowest, about 1 in size: alike in
+    """Points (b, n, 3) about their middle, heights above the lowest, about 1 in size: the same at
     every yaw."""
     middle = points.mean(1, keepdim=True)
     low = points[..., 1].amin(1)

@@ -11,7 +11,7 @@ VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""
 
 
-# Trees are asked by one thread: an interrupt would free the arrays under scipy's other threads.
+# Trees are queried by one thread: an interrupt would free the arrays under scipy's other threads.
 
 
 def snap(

@@ -1,4 +1,4 @@
-"""Parts of a target that nothing on the reference explains: to which region do they belong?
+"""Patches of a target that nothing on the reference explains: to which region do they belong?
 
 A spoiler, a canard, a rail between two legs: the reference has no such place, so its nearest mapped
 points say little about it. What surrounds it says more: a rail ends in legs on both sides and is
@@ -26,8 +26,8 @@ _NEAREST = 7
 def explained_by(distance: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Which target points (n,) have a counterpart on the reference.
 
-    distance: (n, k) to the mapped points that each asked (`association.voters`); error: (n, k) that
-    the field expects of these. Where it expects none, it says nothing of the kind and explains all.
+    distance: (n, k) to the mapped points that vote on each (`association.nearest_voters`); error:
+    (n, k) that the field expects of these. A field that predicts no error explains all points.
     """
     expected = error.mean(axis=1)
     return (distance.mean(axis=1) <= _SLACK + _REACH * expected) | (expected == 0)

@@ -1,9 +1,9 @@
-"""How far a region that was found can be believed, and whether the target has it at all.
+"""Presence of a region on a target: whether it is there, and the overlap to be expected.
 
-A region that is not there must not come back as some other part. What a retrieval knows of itself
-is put into one figure, the overlap with the true region that is to be expected: low where the field
-doubts that the places exist, where little was found and with little trust, and where what was found
-leads back to other places of the reference.
+A region that is not there must not come back as some other part. What is known after retrieval is
+put into one number, the overlap with the true region that is to be expected. It is low where the
+field predicts that points do not exist, where little was found and with little trust, and where
+what was found maps back to other parts of the reference.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _SURE = 0.02  # shares of 0 and 1 are as sure as this
 class Evidence(NamedTuple):
     """What is known of a region after retrieval; 0 is even odds, and full size.
 
-    existence: log odds that its places exist on the target, of their mean. trust: log odds of the
+    existence: log odds that its points exist on the target, of their mean. trust: log odds of the
     mean confidence of the points that were found. size: logarithm of how much was found, compared
     with what the region has of the reference; 0 where it was as much or more. returned: log odds
-    that a point that was found leads back into the region on the reference.
+    that a point that was found maps back into the region on the reference.
     """
 
     existence: float
@@ -52,7 +52,7 @@ class Presence:
 
     confidence: in [0, 1], that this is so. overlap: in [0, 1], intersection over union of what was
     found and the true region, as it is to be expected. observed: share of the region's mapped
-    points that lie where the scan has points. evidence: what all this was judged by, None where
+    points that lie where the scan has points. evidence: what this was computed from, None where
     nothing was.
     """
 
@@ -68,7 +68,7 @@ def evidence_of(existence: np.ndarray, trust: float, size: float, returned: floa
 
     existence: (m,) probabilities, 1 from a field that says nothing of the kind. trust: mean
     confidence of the points found; size: their share of the target over the region's share of the
-    reference; returned: share of them that leads back into the region.
+    reference; returned: share of them that maps back into the region.
     """
     return Evidence(
         _log_odds(float(existence.mean())),
@@ -83,7 +83,7 @@ def find_presence(evidence: Evidence, distance: np.ndarray, whole_distance: np.n
 
     distance: (m,) of its mapped points from the target's, canonical, in position and weighted
     normal; whole_distance: (n,) of the whole reference's. Where the scan shows less than half of
-    what it should, no region is surely absent: what lacks may be hidden.
+    what it should, no region is surely absent: what is missing may be hidden.
     """
     observed = _observed(distance)
     score = BIAS + float(np.dot(WEIGHTS, evidence))

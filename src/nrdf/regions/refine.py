@@ -1,4 +1,4 @@
-"""A few steps of registration from where the field has put a reference: the option `refine`.
+"""A few steps of registration from where the field maps a reference: the option `refine`.
 
 The field's map is moved so that it and the target lie on each other, both ways, in position and
 normal, while displacements stay smooth over the reference (`nrdf.shapes.registration`). It is the

@@ -1,4 +1,4 @@
-"""What a user may call a region of a reference, brought to one form: indices of its points."""
+"""A region as users give it (mask, indices or points), brought to one form: indices."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def region_indices(
 
     region: a boolean mask (n,), integer indices (m,), or points (m, 3) in the reference's frame
     and unit (array or PointCloud), each of which stands for the nearest reference point.
-    tree: gives the tree of the reference's points where one is kept; asked only if needed.
+    tree: gives the tree of the reference's points where one is kept; called only if needed.
 
     Raises RegionError for a region that is empty, has the wrong shape, indices out of range,
     coordinates that are not finite, or points farther from the reference than 2 % of its longest

@@ -1,1 +1,5 @@
-"""Scans as they come: simulated, cleaned, aligned with their category's frame."""
+"""Scans in any pose, with floor, noise and other objects in view.
+
+In: a cloud as a sensor gives it, and a trained encoder of the category. Out: an `AlignedScan`: the
+object alone, its poses with probabilities, its unit and kind, and warnings in words.
+"""

@@ -197,7 +197,7 @@ def _posed(
 
 
 def _facing(scorer: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
-    """Log probabilities (ups, bins) of the yaws about each up; all alike without a network."""
+    """Log probabilities (ups, bins) of the yaws about each up; all equal without a network."""
     if scorer.yaw is None:
         return np.zeros((len(ups), _YAWS))
     order = np.random.default_rng(0).permutation(len(working.points))
@@ -207,13 +207,13 @@ def _facing(scorer: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.
 
 
 def _against(facing: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]) -> np.ndarray:
-    """What the network says against each hypothesis (h,): how much less likely, in logarithms, up
+    """The network's cost of each hypothesis (h,): how much less likely, in logarithms, up
     to what makes it sure."""
-    places = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
-    told = [
-        log_probability_at(facing[i], found.yaw) for i, found in zip(places, refined, strict=True)
+    numbers = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
+    likely = [
+        log_probability_at(facing[i], found.yaw) for i, found in zip(numbers, refined, strict=True)
     ]
-    return np.minimum(-np.array(told), _MOST_AGAINST)
+    return np.minimum(-np.array(likely), _MOST_AGAINST)
 
 
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:

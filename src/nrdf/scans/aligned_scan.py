@@ -28,7 +28,11 @@ one of its sides shows the other one lacks."""
 
 @dataclass(frozen=True)
 class AlignedScan:
-    """scan: as it was read; cleaned: the object in it; alignment: its poses; unit: of the scan."""
+    """A scan, cleaned and aligned.
+
+    scorer: what it was aligned by. scan: as it was read; cleaned: the object in it; alignment: its
+    poses; unit: of the scan.
+    """
 
     scorer: PoseScorer
     scan: PointCloud
@@ -57,7 +61,7 @@ class AlignedScan:
 
     def unthinned_in_metres(self, unit: str) -> PointCloud:
         """All points of the object that the scan has, thinned or not, in metres, the scan being in
-        `unit`: what results are judged by."""
+        `unit`: what results are measured against."""
         return in_metres(unthinned(self.scan, self.cleaned), unit)
 
     @property
@@ -77,7 +81,7 @@ class AlignedScan:
 
     @property
     def warnings(self) -> list[str]:
-        """What a person should know before relying on the pose, in whole sentences."""
+        """What to know before relying on the pose, in whole sentences."""
         found = []
         if self.cleaned.others:
             found.append(

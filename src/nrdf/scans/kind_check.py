@@ -69,7 +69,7 @@ def check_kind(
 ) -> KindCheck:
     """Check a target that is encoded in the pose in which its regions are to be found.
 
-    scorer: gives what is known of the category; it is asked for only without a network.
+    scorer: gives the category's pose scorer; called only where there is no network.
     """
     network = model.kind_network
     if network is None:
@@ -81,10 +81,10 @@ def check_kind(
 def check_points(
     network: KindNetwork, category: str, points: np.ndarray, rotation: np.ndarray
 ) -> KindCheck:
-    """Count the objects in canonical points (n, 3), and ask a category's network about them.
+    """Count the objects in canonical points (n, 3), and classify them by a category's network.
 
     rotation: (3, 3) from canonical coordinates to those of the target's file, in which directions
-    are told.
+    are named.
     """
     few = points[np.random.default_rng(0).permutation(len(points))[:_COUNTED]]
     count = count_objects(PointCloud(few), up_axis("y"))
@@ -100,7 +100,7 @@ def check_points(
 def check_by_network(
     network: KindNetwork, category: str, points: np.ndarray, rotation: np.ndarray
 ) -> KindCheck:
-    """What a category's network says of the canonical points (n, 3) of one object; rotation: as of
+    """Classify by a category's network the canonical points (n, 3) of one object; rotation: as of
     `check_points`."""
     order = np.random.default_rng(0).permutation(len(points))
     likely = network.probabilities(points[order])

@@ -1,7 +1,7 @@
-"""How well a field can explain a cloud in a hypothesised frame.
+"""Scores of hypothesised poses: how well a field explains the cloud in each of them.
 
-Surfaces of a few known members of the category are mapped onto the cloud by the field (C of their
-descriptors and the cloud's embedding). In the right frame they come to lie on it, on the right
+Prototypes, a few known members of the category, are mapped onto the cloud by the field (C of their
+descriptors and the cloud's embedding). In the right pose they come to lie on it, on the right
 sides; in a wrong one the field puts seats where backs are, off the surface.
 """
 
@@ -28,19 +28,22 @@ FIRST_SEED = 900_000  # of the members that serve as prototypes; no training set
 PROTOTYPES = 8
 _COARSE_POINTS = 128  # of each prototype
 _FINE_POINTS = 256
-_JUDGED_POINTS = 512  # of the cloud
+_SCORED_POINTS = 512  # of the cloud
 _COARSE_TOLERANCE, _FINE_TOLERANCE = 0.05, 0.03
 """Distance at which a point counts half as explained, canonical."""
 _UNSEEN = 0.5  # weight of the prototypes' points: what they lie on may not have been seen
-_DEPTH = 0.02  # how far below and above the surface the field is asked for occupancy, canonical
-_DOUBT, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
+_DEPTH = 0.02  # below and above the surface, where occupancy is evaluated, canonical
+_ERROR, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
 _USUAL_POINTS = 1024
 _LEAST_SPREAD = 0.15  # of the logarithm of proportions
 _BATCH = 36
 
 
 class PoseScorer:
-    """Prototypes of a model's category, their descriptors known."""
+    """Scores poses of clouds by prototypes of a model's category, whose descriptors are kept.
+
+    A score is a cost: the lower, the better the field explains the cloud.
+    """
 
     def __init__(
         self,
@@ -49,7 +52,7 @@ class PoseScorer:
         yaw: YawNetwork | None = None,
     ) -> None:
         """`prototypes` are canonical in orientation; members of the category's family unless given.
-        `yaw` tells which way its objects face; the category's in the zoo unless given.
+        `yaw` estimates which way an object faces; the category's in the zoo unless given.
 
         Raises ModelError if there are none and the category has no family.
         """
@@ -58,15 +61,15 @@ class PoseScorer:
         given = list(prototypes) or family_prototypes(model.category)
         self.prototypes = len(given)
         self._clouds = [model.encode(cloud) for cloud in given]
-        described = []
+        descriptors = []
         with torch.inference_mode():
             for cloud in self._clouds:
                 chosen = downsample(cloud.points, _FINE_POINTS, np.random.default_rng(0))
                 chosen = np.random.default_rng(0).permutation(chosen)
                 points = model.tensor(cloud.points[chosen])[None]
                 normals = model.tensor(cloud.normals[chosen])[None]
-                described.append(model.field.describe(cloud.z, points, normals))
-        self._k = torch.cat(described)  # (p, _FINE_POINTS, d_k)
+                descriptors.append(model.field.describe(cloud.z, points, normals))
+        self._k = torch.cat(descriptors)  # (p, _FINE_POINTS, d_k)
 
     def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Cost (h,) of h hypotheses: clouds (h, n, 3) in hypothesised canonical frames.
@@ -86,9 +89,9 @@ class PoseScorer:
     ) -> np.ndarray:
         """Cost (h,) as of `coarse`, more exactly, with the errors that the field expects.
 
-        whole, whole_normals: (h, m, 3) what is embedded: the cloud, completed by its mirror image
-        where it has one. Added are the error that the field expects of itself on the prototypes,
-        and how far it is from finding matter just below the cloud's points and none above.
+        whole, whole_normals: (h, m, 3) what the field encodes: the cloud, completed by its mirror
+        image where it has one. Added are the error that the field expects on the prototypes, and
+        how far it is from finding matter just below the cloud's points and none above.
         """
         return self._fine(points, normals, whole, whole_normals).mean(axis=1)
 
@@ -98,7 +101,7 @@ class PoseScorer:
 
     @cached_property
     def usual_cost(self) -> float:
-        """The mean cost of each prototype, judged by the others: what is usual in the category."""
+        """Mean cost of the prototypes, each scored by the others: what is usual in the category."""
         costs = []
         for number, cloud in enumerate(self._clouds):
             each = self._each_cost(cloud)
@@ -106,8 +109,8 @@ class PoseScorer:
         return float(np.mean(costs))
 
     def proportion_z_score(self, points: np.ndarray) -> float:
-        """How far the proportions of a canonical cloud (n, 3) are from the prototypes', in standard
-        deviations (root mean square over the axes)."""
+        """Z-score of the proportions of a canonical cloud (n, 3): standard deviations from the
+        prototypes' mean (root mean square over the axes)."""
         known = np.array([_proportions(cloud.points) for cloud in self._clouds])
         spread = np.maximum(known.std(axis=0), _LEAST_SPREAD)
         return float(np.sqrt(np.mean(((_proportions(points) - known.mean(axis=0)) / spread) ** 2)))
@@ -126,8 +129,8 @@ class PoseScorer:
         cost, inverse, z = self._explained(q, n, w, wn, _FINE_POINTS, _FINE_TOLERANCE)
         with torch.inference_mode():
             if inverse.log_error is not None:
-                doubt = inverse.log_error.unflatten(1, (self.prototypes, -1))
-                cost = cost + _DOUBT * doubt.mean(2)
+                error = inverse.log_error.unflatten(1, (self.prototypes, -1))
+                cost = cost + _ERROR * error.mean(2)
             below = self.model.field.occupancy(z, q - _DEPTH * n)
             above = self.model.field.occupancy(z, q + _DEPTH * n)
             wrong = functional.softplus(-below) + functional.softplus(above)
@@ -136,17 +139,17 @@ class PoseScorer:
     def _explained(
         self, q: Tensor, n: Tensor, w: Tensor, wn: Tensor, count: int, tolerance: float
     ) -> tuple[Tensor, Inverse, Tensor]:
-        """Cost (h, p) of clouds q, n (h, ., 3), embedded as w, wn; what C said; embeddings."""
+        """Cost (h, p) of clouds q, n (h, ., 3), encoded from w, wn; C's output; embeddings."""
         field, h = self.model.field, len(q)
         with torch.inference_mode():
             z = field.embed(w, wn)
             k = self._k[:, :count].flatten(0, 1)
             inverse = field.invert(z, k.expand(h, -1, -1))
             mapped = inverse.points
-            seen = q[:, :_JUDGED_POINTS]
+            seen = q[:, :_SCORED_POINTS]
             if inverse.normals is not None:
                 mapped = torch.cat([mapped, NORMAL_WEIGHT * inverse.normals], dim=-1)
-                seen = torch.cat([seen, NORMAL_WEIGHT * n[:, :_JUDGED_POINTS]], dim=-1)
+                seen = torch.cat([seen, NORMAL_WEIGHT * n[:, :_SCORED_POINTS]], dim=-1)
             mapped = mapped.unflatten(1, (self.prototypes, count)).flatten(0, 1)
             seen = seen[:, None].expand(-1, self.prototypes, -1, -1).flatten(0, 1)
             square = torch.cdist(seen, mapped).square()

@@ -65,7 +65,7 @@ class DataConfig(StrictModel):
     """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
     within a pool. Empty: one pool of all shapes."""
     exact_groups: list[str] = Field(default=["family-*", "shared-*"])
-    """Patterns of correspondence groups whose weight 0 is a fact ("no such place"), not a doubt."""
+    """Patterns of correspondence groups whose weight 0 means "no such place", not "uncertain"."""
     weight_threshold: float = Field(default=0.05, ge=0, le=1)
     """Correspondences of less confidence are not drawn."""
     augment: AugmentConfig = AugmentConfig()

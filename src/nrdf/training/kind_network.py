@@ -1,4 +1,4 @@
-"""Training of the networks that tell whether a cloud is an object of the category, and how turned.
+"""Training of the networks that classify a cloud: of the category, how oriented, or another kind.
 
 Members are shown as scans see them, in every orientation; other kinds likewise, and pairs of
 objects that stand side by side, and boxes put together at random.
@@ -267,19 +267,21 @@ def _meshes(paths: Sequence[Path]) -> list[Views]:
 def validate(
     network: KindNetwork, members: Views, others: Views, settings: KindSettings
 ) -> dict[str, float]:
-    """Shares of clouds that are told wrongly, as shown once: members upright and forward, and all
-    else, taken for that or not; lower is better."""
+    """Shares of clouds that are classified wrongly, as shown once; lower is better.
+
+    Members that are upright and forward but refused, and all others that are taken for such.
+    """
     network.eval()
     generator = torch.Generator().manual_seed(12345)
-    told, right = [], []
+    predicted, right = [], []
     with torch.inference_mode():
         for own in torch.arange(len(members)).repeat(8).split(settings.batch):
             points, answers = draw(
                 members, own, others, network.config.points, settings.noise, generator
             )
-            told.append(network(points).argmax(1))
+            predicted.append(network(points).argmax(1))
             right.append(answers)
-    taken, true = torch.cat(told) == 0, torch.cat(right) == 0
+    taken, true = torch.cat(predicted) == 0, torch.cat(right) == 0
     return {
         "members-refused": float((~taken[true]).float().mean()),
         "others-passed": float(taken[~true].float().mean()),

@@ -22,7 +22,7 @@ def distances(a: Tensor, b: Tensor) -> Tensor:
 
 
 def with_normals(points: Tensor, normals: Tensor, weight: float) -> Tensor:
-    """Features (x, λn) (..., 6): near in them means near in place *and* facing alike."""
+    """Features (x, λn) (..., 6): near in them means near in position *and* in normal."""
     return torch.cat([points, weight * normals], dim=-1)
 
 

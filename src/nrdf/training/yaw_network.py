@@ -1,4 +1,4 @@
-"""Training of the networks that tell yaw: on simulated views of shapes, turned at random."""
+"""Training of the networks that estimate yaw: on simulated views of shapes, at random yaws."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.errors import DataError
-from nrdf.field.yaw_network import YawConfig, YawNetwork, turn
+from nrdf.field.yaw_network import YawConfig, YawNetwork, yaw_rotations
 from nrdf.training.camera_views import Views, draw_seen, load_views, split
 from nrdf.training.provenance import list_shapes, provenance
 from nrdf.training.small_networks import Settings, run_steps, small_run, write_small_network
@@ -70,7 +70,7 @@ def draw(
     and the yaws (b,) (rad) by which they are turned."""
     points, normals = draw_seen(views, chosen, count, noise, generator)
     yaw = 2 * math.pi * torch.rand(len(chosen), generator=generator)
-    rotation = turn(yaw)
+    rotation = yaw_rotations(yaw)
     return (
         torch.einsum("bij,bnj->bni", rotation, points),
         torch.einsum("bij,bnj->bni", rotation, normals),
