@@ -19,7 +19,7 @@ from nrdf.export.rotation import tool_axes
 from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _WIDTH = 72
-_CARRIED = (
+_SUPPORT = (
     "Contact force is not carried: it stands in PPRINT lines. Nor is the tool's turn about its "
     "own axis. Spindle, feed and dwell are."
 )
@@ -30,8 +30,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     name = program_name(job, options, 24, "the file system")
     axis = "i j k, the tool's axis from its tip to its holder, out of the part."
-    said = header(job, options, "Lengths in mm, feed in mm/min, DELAY in s.", axis, _CARRIED)
-    lines = [f"PARTNO/{name.upper()}", *commented(said, "$$ ", width=_WIDTH)]
+    comments = header(job, options, "Lengths in mm, feed in mm/min, DELAY in s.", axis, _SUPPORT)
+    lines = [f"PARTNO/{name.upper()}", *commented(comments, "$$ ", width=_WIDTH)]
     lines += ["UNITS/MM", "MULTAX/ON"]
     numbers_of = tool_numbers(job, options)
     loaded = None

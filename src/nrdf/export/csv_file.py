@@ -18,7 +18,7 @@ COLUMNS = (
     *("segment", "kind", "line", "feed_m_s", "force_n", "dwell_s"),
     *("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"),
 )
-_CARRIED = (
+_SUPPORT = (
     "Empty force_n: no contact. Empty spindle_rad_s: nothing turns. dwell_s: after the waypoint. "
     "Free parameters are not carried."
 )
@@ -28,14 +28,14 @@ def write(job: Job, options: Options, folder: Path) -> None:
     """Write PROGRAM.csv."""
     job = prepare(job, options, "into")
     name = program_name(job, options, 64, "the file system")
-    turned = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
-    lines = commented(header(job, options, "SI units.", turned, _CARRIED), "# ")
+    orientation = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
+    lines = commented(header(job, options, "SI units.", orientation, _SUPPORT), "# ")
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(COLUMNS)
     for i, path in enumerate(job.paths, start=1):
-        said = (path.region, path.process, path.tool)
-        names = [spreadsheet_text(plain_text(text)) for text in said]
+        texts = (path.region, path.process, path.tool)
+        names = [spreadsheet_text(plain_text(text)) for text in texts]
         whole = [i, *names, float(path.tool_radius_m), path.spindle_rad_s]
         for k, segment in enumerate(path.segments, start=1):
             about = [k, segment.kind, segment.line, segment.feed_m_s, segment.force_n]

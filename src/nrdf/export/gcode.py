@@ -22,7 +22,7 @@ from nrdf.export.prepare import blended_segments, prepare, tool_numbers
 from nrdf.export.rotation import rotary_angles_deg, tool_axes
 from nrdf.toolpath.types import Job, Segment, ToolPath
 
-_CARRIED = (
+_SUPPORT = (
     "Contact force is not carried: it stands in comments. Nor is the tool's turn about its own "
     "axis. Spindle, feed and dwell are."
 )
@@ -36,14 +36,14 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     name = program_name(job, options, 24, "the file system")
     unit = "Lengths in mm (G21), F in mm/min (G94), G4 X in s."
-    said = header(job, options, unit, _orientation(options), _CARRIED, _control(options))
-    lines = ["%", f"O{options.program_number:04d} ({name.upper()})", *_comments(said)]
+    comments = header(job, options, unit, _orientation(options), _SUPPORT, _control(options))
+    lines = ["%", f"O{options.program_number:04d} ({name.upper()})", *_comments(comments)]
     lines += ["G21 G90 G94 G17 G40 G49 G80", f"G{53 + options.frame_number}"]
     numbers_of = tool_numbers(job, options)
     loaded = None
     for i, path in enumerate(job.paths, start=1):
         lines += _comments([path_title(path, i)])
-        # Up before anything turns or is changed: the way to the part is nobody's plan.
+        # Up before anything turns or is changed: nobody has planned the way to the part.
         lines.append("G53 G0 Z0.0")
         tool = numbers_of[path.tool]
         if tool != loaded:
@@ -80,15 +80,15 @@ def _comments(lines: list[str]) -> list[str]:
 
 
 def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
-    driven = [blended.segment for blended in blended_segments(path, 0.0)]
-    words = _words(driven, options)
+    segments = [blended.segment for blended in blended_segments(path, 0.0)]
+    words = _words(segments, options)
     lines = []
     if path.spindle_rad_s is not None:
         lines.append(f"S{revolutions_per_minute(path.spindle_rad_s):.0f} M3")
     offset = "G43" if options.without_tcp_control else "G43.4"
     lines += [f"G0 {words[0][1]}", f"{offset} H{tool}"]
     row = 0
-    for index, segment in enumerate(driven, start=1):
+    for index, segment in enumerate(segments, start=1):
         lines += _comments([segment_title(segment, index)])
         feed = f" F{number(60000 * segment.feed_m_s, 2)}"
         for _ in range(len(segment.positions)):
@@ -104,10 +104,10 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     return [*lines, "G49", *(["M5"] if path.spindle_rad_s is not None else [])]
 
 
-def _words(driven: list[Segment], options: Options) -> list[tuple[str, str]]:
+def _words(segments: list[Segment], options: Options) -> list[tuple[str, str]]:
     """X Y Z and the two angles of each waypoint of a path; C goes on from segment to segment."""
-    positions = 1000 * np.concatenate([segment.positions for segment in driven])
-    axes = tool_axes(np.concatenate([segment.quaternions_xyzw for segment in driven]))
+    positions = 1000 * np.concatenate([segment.positions for segment in segments])
+    axes = tool_axes(np.concatenate([segment.quaternions_xyzw for segment in segments]))
     angles = rotary_angles_deg(axes, options.rotary, options.tilt)
     if options.without_tcp_control:
         positions = on_tables(positions, angles, options.rotary)
@@ -128,5 +128,5 @@ def on_tables(positions: np.ndarray, angles_deg: np.ndarray, rotary: str) -> np.
     Rz(C) Rx(A) or Rz(C) Ry(B).
     """
     order = "ZX" if rotary == "AC" else "ZY"
-    turn = Rotation.from_euler(order, angles_deg[:, ::-1], degrees=True)
-    return turn.inv().apply(positions)
+    rotation = Rotation.from_euler(order, angles_deg[:, ::-1], degrees=True)
+    return rotation.inv().apply(positions)

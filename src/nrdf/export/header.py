@@ -23,11 +23,11 @@ _WARNING = (
 
 
 def header(
-    job: Job, options: Options, unit: str, orientation: str, carried: str, notes: str = ""
+    job: Job, options: Options, unit: str, orientation: str, support: str, notes: str = ""
 ) -> list[str]:
     """Sentences for the top of a file.
 
-    unit: of positions and speeds. orientation: how it is written. carried: what becomes of force,
+    unit: of positions and speeds. orientation: how it is written. support: what becomes of force,
     spindle and dwell. notes: what the user has to set.
     """
     lines = [
@@ -35,7 +35,7 @@ def header(
         f"Frame: {plain_text(job.frame)}. Positions are those of the tool centre point. {unit}",
         _object_pose(job),
         f"Orientation: {orientation}",
-        carried,
+        support,
         *([notes] if notes else []),
         _WARNING,
     ]

@@ -15,7 +15,7 @@ from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.types import Job
 
 VERSION = 1
-_CARRIED = (
+_SUPPORT = (
     "force_n null: no contact. spindle_rad_s null: nothing turns. dwell_s: after the segment's "
     "last waypoint."
 )
@@ -38,8 +38,8 @@ def _on_one_line(found: re.Match[str]) -> str:
 
 def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, Any]:
     """All of a prepared `job` as JSON has it, the waypoints themselves if wanted."""
-    turned = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
-    conventions = header(job, options, "SI units.", turned, _CARRIED)
+    orientation = f"unit quaternion qx qy qz qw; {tool_z_words(options, 'into')}."
+    conventions = header(job, options, "SI units.", orientation, _SUPPORT)
     paths = []
     for path in job.paths:
         segments = []

@@ -27,7 +27,7 @@ _WORDS = (
     "while xor bas"
 )
 _LONGEST = 24
-_CARRIED = (
+_SUPPORT = (
     "Contact force is not carried: it needs the option ForceTorqueControl, and stands in comments. "
     "Spindle speed is not either: switch it where a path begins. Dwell is."
 )
@@ -41,12 +41,12 @@ def write(job: Job, options: Options, folder: Path) -> None:
     """Write PROGRAM.src and PROGRAM.dat."""
     job = prepare(job, options, "into")
     name = program_name(job, options, _LONGEST, "KRL", _WORDS)
-    turned = f"A B C in degrees about Z, new Y, new X; {tool_z_words(options, 'into')}."
-    said = header(job, options, "Lengths in mm.", turned, _CARRIED, _NOTES)
+    orientation = f"A B C in degrees about Z, new Y, new X; {tool_z_words(options, 'into')}."
+    comments = header(job, options, "Lengths in mm.", orientation, _SUPPORT, _NOTES)
     numbers_of = tool_numbers(job, options)
     constants = {tool: f"nrdf_tool_{n}" for tool, n in numbers_of.items()}
     procedures = routine_names(job, _LONGEST)
-    lines = ["&ACCESS RVP", "&REL 1", f"DEF {name}( )", *commented(said, "; ")]
+    lines = ["&ACCESS RVP", "&REL 1", f"DEF {name}( )", *commented(comments, "; ")]
     lines += [";FOLD INI", "BAS(#INITMOV,0)", ";ENDFOLD (INI)"]
     lines += ["BAS(#VEL_PTP,10)", "BAS(#BASE,nrdf_base)", "$APO.CDIS=nrdf_blend_mm"]
     lines += ["PTP $AXIS_ACT", *(f"{procedure}( )" for procedure in procedures), "END"]

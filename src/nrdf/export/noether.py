@@ -25,15 +25,15 @@ from nrdf.export.prepare import prepare
 from nrdf.toolpath.types import Job, Segment
 
 _KEYS = ("x", "y", "z", "qx", "qy", "qz", "qw")
-_CARRIED = "Contact force, speed, spindle and dwell are not carried: they stand in comments."
+_SUPPORT = "Contact force, speed, spindle and dwell are not carried: they stand in comments."
 
 
 def write(job: Job, options: Options, folder: Path) -> None:
     """Write PROGRAM.yaml."""
     job = prepare(job, options, "out")
     name = program_name(job, options, 64, "the file system")
-    turned = f"unit quaternion; {tool_z_words(options, 'out')}."
-    lines = commented(header(job, options, "Lengths in m.", turned, _CARRIED), "# ")
+    orientation = f"unit quaternion; {tool_z_words(options, 'out')}."
+    lines = commented(header(job, options, "Lengths in m.", orientation, _SUPPORT), "# ")
     for i, path in enumerate(job.paths, start=1):
         lines += ["-", *commented([path_title(path, i)], "  # ")]
         numbered = enumerate(path.segments, start=1)

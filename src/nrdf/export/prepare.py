@@ -1,4 +1,4 @@
-"""What every writer does first: choose, turn and check what is written."""
+"""What every writer does first: choose what is written, turn its tools and check it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BlendedSegment:
 
 
 def prepare(job: Job, options: Options, tool_z: ToolZ) -> Job:
-    """The part of `job` that is to be written, in the frame's and tool's names that were asked for.
+    """The part of `job` that is to be written, with the frame and tool names of the options.
 
     tool_z: where the format's tools point unless the options say otherwise. Paths of which nothing
     is left are left out.
@@ -90,8 +90,8 @@ def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
     )
     kept[1:] = moved | (turned > _SAME)
     owner, positions, quaternions = owner[kept], positions[kept], quaternions[kept]
-    way = np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1)
-    blends = np.minimum(blend_m, 0.45 * np.minimum(way, np.append(way[1:], 0.0)))
+    step = np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1)
+    blends = np.minimum(blend_m, 0.45 * np.minimum(step, np.append(step[1:], 0.0)))
     blends[blends < _SMALLEST_BLEND_M] = 0.0
     for i, segment in enumerate(path.segments):
         after = path.segments[i + 1] if i + 1 < len(path.segments) else None

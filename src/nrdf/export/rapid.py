@@ -24,7 +24,7 @@ _WORDS = (
     "inout local mod module nostepin not noview or pers proc raise readonly record retry return "
     "step sysmodule test then to trap true trynext undo var viewonly while with xor main"
 )
-_CARRIED = (
+_SUPPORT = (
     "Contact force is not carried: it needs the option Force Control, and stands in comments. "
     "Spindle speed is not either: switch it where a path begins. Dwell is."
 )
@@ -38,13 +38,13 @@ def write(job: Job, options: Options, folder: Path) -> None:
     name = program_name(job, options, _LONGEST - 4, "RAPID", _WORDS)
     frame = identifier(job.frame, _LONGEST)
     tools = identifiers((path.tool for path in job.paths), _LONGEST, "RAPID")
-    turned = f"quaternion q1 q2 q3 q4 = w x y z; {tool_z_words(options, 'into')}."
-    said = header(
+    orientation = f"quaternion q1 q2 q3 q4 = w x y z; {tool_z_words(options, 'into')}."
+    comments = header(
         job,
         options,
         "Lengths in mm, speeds in mm/s.",
-        turned,
-        _CARRIED,
+        orientation,
+        _SUPPORT,
         f"Must exist in the controller: wobjdata {frame}; tooldata {', '.join(tools.values())}. "
         "The configuration is left to the controller (ConfL off).",
     )
@@ -52,7 +52,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
     speeds = {feed: f"nrdf_v{i}" for i, feed in enumerate(feeds, start=1)}
     procedures = routine_names(job, _LONGEST)
     # A module and a routine in it must not have one name.
-    lines = [f"MODULE mod_{name}", *commented(said, "  ! ")]
+    lines = [f"MODULE mod_{name}", *commented(comments, "  ! ")]
     for feed, speed in speeds.items():
         value = f"[{number(1000 * feed, 4)},500,5000,1000]"
         lines.append(f"  LOCAL CONST speeddata {speed}:={value};")
@@ -85,11 +85,11 @@ def _path(path: ToolPath, options: Options, speeds: dict[float, str], how: str) 
 
 def _targets(blended: BlendedSegment) -> list[tuple[str, str]]:
     """Robtarget and zone of each waypoint."""
-    turns = xyzw_to_wxyz(blended.segment.quaternions_xyzw)
+    quaternions = xyzw_to_wxyz(blended.segment.quaternions_xyzw)
     made = []
-    for position, turn, blend in zip(
-        1000 * blended.segment.positions, turns, blended.blends_m, strict=True
+    for position, quaternion, blend in zip(
+        1000 * blended.segment.positions, quaternions, blended.blends_m, strict=True
     ):
-        values = f"[{','.join(numbers(position, 5))}],[{','.join(numbers(turn, 9))}]"
+        values = f"[{','.join(numbers(position, 5))}],[{','.join(numbers(quaternion, 9))}]"
         made.append((f"[{values},{_REST}]", "nrdf_zone" if blend else "fine"))
     return made

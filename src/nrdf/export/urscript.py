@@ -25,7 +25,7 @@ _WORDS = (
     "movel movep not or p pause popup return run sleep stopj stopl sync textmsg thread true while "
     "xor force_mode end_force_mode zero_ftsensor pose_trans"
 )
-_CARRIED = (
+_SUPPORT = (
     "Contact force is carried: force_mode, compliant along tool z alone, from the first waypoint "
     "with force to the last. Spindle speed is not: switch it where a path begins. Dwell is."
 )
@@ -41,10 +41,10 @@ def write(job: Job, options: Options, folder: Path) -> None:
     """Write PROGRAM.script."""
     job = prepare(job, options, "into")
     name = program_name(job, options, 32, "URScript", _WORDS)
-    turned = f"rotation vector rx ry rz in rad; {tool_z_words(options, 'into')}."
-    said = header(job, options, "Lengths in m, speeds in m/s.", turned, _CARRIED, _NOTES)
+    orientation = f"rotation vector rx ry rz in rad; {tool_z_words(options, 'into')}."
+    comments = header(job, options, "Lengths in m, speeds in m/s.", orientation, _SUPPORT, _NOTES)
     procedures = routine_names(job, 32)
-    lines = [*commented(said, "# "), f"def {name}():", *_shared()]
+    lines = [*commented(comments, "# "), f"def {name}():", *_shared()]
     mounted = job.paths[0].tool
     for i, (procedure, path) in enumerate(zip(procedures, job.paths, strict=True), start=1):
         lines += [f"  def {procedure}():", *commented([path_title(path, i)], "    # ")]
@@ -89,8 +89,8 @@ def _set_tcp(path: ToolPath) -> list[str]:
     """The tool centre point, where it is known."""
     if path.tcp_m is None:
         return []
-    turned = rotation_vectors(np.array(path.tcp_quaternion_xyzw or (0.0, 0.0, 0.0, 1.0)))
-    values = ", ".join(numbers(path.tcp_m, 7) + numbers(turned, 8))
+    rotation = rotation_vectors(np.array(path.tcp_quaternion_xyzw or (0.0, 0.0, 0.0, 1.0)))
+    values = ", ".join(numbers(path.tcp_m, 7) + numbers(rotation, 8))
     return [f"    set_tcp(p[{values}])"]
 
 
@@ -133,12 +133,12 @@ def _moves(blended: BlendedSegment, acceleration_m_s2: float) -> list[tuple[str,
     if len(blended.segment.positions) == 0:
         return []
     speed = f"a={number(acceleration_m_s2, 3)}, v={number(blended.segment.feed_m_s, 5)}"
-    turns = rotation_vectors(blended.segment.quaternions_xyzw)
+    rotations = rotation_vectors(blended.segment.quaternions_xyzw)
     made = []
-    for position, turn, blend in zip(
-        blended.segment.positions, turns, blended.blends_m, strict=True
+    for position, rotation, blend in zip(
+        blended.segment.positions, rotations, blended.blends_m, strict=True
     ):
-        values = ", ".join(numbers(position, 7) + numbers(turn, 8))
+        values = ", ".join(numbers(position, 7) + numbers(rotation, 8))
         how = f"{speed}, r={number(float(blend), 5)}"
         made.append((f"pose_trans(nrdf_frame, p[{values}])", how))
     return made

@@ -29,15 +29,15 @@ def test_a_folder_that_is_no_whole_job(tmp_path):
 def test_a_job_stands_upright_in_the_cell_as_its_pose_says(plate_job, tmp_path, up):
     rotation = upright(up_axis(up)) @ rotation_about_up(0.4)
     pose = Similarity(rotation, np.array([2.0, -1.0, 5.0]), 1.0)
-    work = read_simulation_job(turned_job(plate_job, tmp_path, pose))
-    assert work.origin == "the object stands as the job's pose says" and not work.assumed
-    distance_field = distance_field_from_points(work.points, work.normals)
+    job = read_simulation_job(turned_job(plate_job, tmp_path, pose))
+    assert job.origin == "the object stands as the job's pose says" and not job.assumed
+    distance_field = distance_field_from_points(job.points, job.normals)
     (there,) = Placement((0.75, 0.0, 0.3), np.pi, 0.1, (0.0,)).T_cell_object(
-        distance_field, work.upright
+        distance_field, job.upright
     )
     np.testing.assert_allclose(there[:3, :3] @ rotation[:, 1], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(there[:3, :3] @ rotation[:, 0], [1, 0, 0], atol=1e-9)
-    points = work.points @ there[:3, :3].T + there[:3, 3]
+    points = job.points @ there[:3, :3].T + there[:3, 3]
     assert points[:, 2].min() == pytest.approx(0.1, abs=0.01)
     assert np.ptp(points[:, 2]) == pytest.approx(0.03, abs=1e-6)  # the plate lies flat
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -45,9 +45,9 @@ def test_a_job_stands_upright_in_the_cell_as_its_pose_says(plate_job, tmp_path, 
 
 
 def test_a_job_that_does_not_say_how_it_lies_is_taken_to_be_canonical_and_said_to_be(plate_job):
-    work = read_simulation_job(plate_job)
-    np.testing.assert_allclose(work.upright[[2, 0]], np.eye(3)[[1, 0]], atol=1e-12)
-    assert work.assumed and "taken to have +Y up and +X ahead" in work.origin
+    job = read_simulation_job(plate_job)
+    np.testing.assert_allclose(job.upright[[2, 0]], np.eye(3)[[1, 0]], atol=1e-12)
+    assert job.assumed and "taken to have +Y up and +X ahead" in job.origin
     given = read_simulation_job(plate_job, "z")
     np.testing.assert_allclose(given.upright[[2, 0]], np.eye(3)[[2, 0]], atol=1e-12)
     assert not given.assumed and given.origin == "up is z, as given"

@@ -62,8 +62,8 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
     warnings += _drop_other_joints(spec, model, chosen)
     model = compile_arm(spec, file)
     chosen = [model.joint(name).id for name in names]
-    speeds, told = _speed_limits(file, model, names)
-    warnings += told
+    speeds, messages = _speed_limits(file, model, names)
+    warnings += messages
     chain, frames = _chain(model, chosen, frame, is_site, speeds)
     _check_kinematics(model, chain, chosen, frame, is_site, file)
     spheres, shapes = _spheres(model, chosen, frames, FINE)
@@ -81,7 +81,7 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
     reach = float(np.linalg.norm(chain.origins[1:, :3, 3], axis=1).sum())
     checked = (
         f"{len(names)} axes from the base to the tool frame '{frame}': {ranges}",
-        f"forward kinematics agree with MuJoCo's to {_SAME * 1e3:g} mm at 20 random places",
+        f"forward kinematics agree with MuJoCo's to {_SAME * 1e3:g} mm in 20 random configurations",
         f"{shapes} shapes for collisions, enclosed in {len(spheres.radii)} spheres for planning",
         f"links add up to {reach:.2f} m",
     )
@@ -100,16 +100,16 @@ def load_arm(path: str | Path | None = None, tool_frame: str | None = None) -> A
     )
 
 
-def _tool_frame(model: Any, asked: str | None, file: Path) -> tuple[str, bool]:
+def _tool_frame(model: Any, wanted: str | None, file: Path) -> tuple[str, bool]:
     """Name of the tool frame, and whether it is a site."""
     sites = [model.site(i).name for i in range(model.nsite) if model.site(i).name]
     bodies = [model.body(i).name for i in range(1, model.nbody) if model.body(i).name]
-    if asked is not None:
-        if asked in sites:
-            return asked, True
-        if asked in bodies:
-            return asked, False
-        raise RobotError(f"{file.name}: " + unknown_name("tool frame", asked, [*sites, *bodies]))
+    if wanted is not None:
+        if wanted in sites:
+            return wanted, True
+        if wanted in bodies:
+            return wanted, False
+        raise RobotError(f"{file.name}: " + unknown_name("tool frame", wanted, [*sites, *bodies]))
     for name in _FRAMES:
         if name in sites or name in bodies:
             return name, name in sites
@@ -131,9 +131,9 @@ def _joints(model: Any, frame: str, is_site: bool, file: Path) -> list[int]:
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
         chosen = [*range(first, first + count), *chosen] if count else chosen
         body = model.body_parentid[body]
-    turning = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    allowed = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     for joint in chosen:
-        if model.jnt_type[joint] not in turning:
+        if model.jnt_type[joint] not in allowed:
             raise RobotError(
                 f"{file.name}: the joint '{model.joint(joint).name}' neither turns nor slides; an "
                 "arm on a fixed base is needed"
@@ -192,9 +192,9 @@ def _at_zero(model: Any) -> Any:
     return data
 
 
-def _pose(rotation: np.ndarray, place: np.ndarray) -> np.ndarray:
+def _pose(rotation: np.ndarray, position: np.ndarray) -> np.ndarray:
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), place
+    pose[:3, :3], pose[:3, 3] = rotation.reshape(3, 3), position
     return pose
 
 
@@ -213,14 +213,13 @@ def _chain(
         frames.append(_pose(data.xmat[model.jnt_bodyid[joint]], data.xanchor[joint]))
     origins = [np.linalg.inv(a) @ b for a, b in itertools.pairwise(frames)]
     tool = data.site(frame) if is_site else data.body(frame)
-    place = tool.xpos
     limited = model.jnt_limited[chosen].astype(bool)
     ranges = np.where(limited[:, None], model.jnt_range[chosen], [-2 * np.pi, 2 * np.pi])
     chain = Chain(
         origins=np.array(origins),
         axes=model.jnt_axis[chosen].copy(),
         slides=model.jnt_type[chosen] == int(mujoco.mjtJoint.mjJNT_SLIDE),
-        T_last_tool=np.linalg.inv(frames[-1]) @ _pose(tool.xmat, place),
+        T_last_tool=np.linalg.inv(frames[-1]) @ _pose(tool.xmat, tool.xpos),
         lower=ranges[:, 0].copy(),
         upper=ranges[:, 1].copy(),
         speeds=speeds,

@@ -58,11 +58,11 @@ class Placement:
         return np.linalg.inv(self.T_cell_base()) @ self.T_cell_object(distance_field, upright)
 
 
-def _pose(yaw: float, place: tuple[float, float, float]) -> np.ndarray:
+def _pose(yaw: float, position: tuple[float, float, float]) -> np.ndarray:
     pose = np.eye(4)
     cosine, sine = np.cos(yaw), np.sin(yaw)
     pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
-    pose[:3, 3] = place
+    pose[:3, 3] = position
     return pose
 
 

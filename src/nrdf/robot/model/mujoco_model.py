@@ -67,14 +67,14 @@ def read_arm_file(file: Path) -> tuple[Any, list[str]]:
     for mesh in list(spec.meshes):
         if mesh.name in missing:
             spec.delete(mesh)
-    told = []
+    messages = []
     if missing:
         names = ", ".join(sorted(missing.values())[:3])
-        told.append(
+        messages.append(
             f"{len(missing)} meshes of {file.name} are not there or not STL or OBJ ({names}): "
             "collisions of these shapes are not seen"
         )
-    return spec, told
+    return spec, messages
 
 
 def _mesh_file(folder: Path, meshdir: str, name: str) -> Path | None:
@@ -82,10 +82,10 @@ def _mesh_file(folder: Path, meshdir: str, name: str) -> Path | None:
     tail = Path(name.split("://", 1)[-1])
     if tail.suffix.lower() not in (".stl", ".obj", ".msh"):
         return None
-    places = [folder / meshdir / tail, folder / meshdir / tail.name]
+    candidates = [folder / meshdir / tail, folder / meshdir / tail.name]
     for above in (folder, *folder.parents[:3]):
-        places += [above / tail, above / Path(*tail.parts[1:])]
-    return next((place.resolve() for place in places if place.is_file()), None)
+        candidates += [above / tail, above / Path(*tail.parts[1:])]
+    return next((path.resolve() for path in candidates if path.is_file()), None)
 
 
 def delete_scene_parts(spec: Any) -> None:

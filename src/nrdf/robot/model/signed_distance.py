@@ -23,7 +23,7 @@ CELL_M = 0.008
 MARGIN_M = 0.20
 """How far around the object distances are known; farther away, they are at least about that."""
 _BAND = 5.0  # cells around the surface where distances are exact
-_COARSE = 4  # nodes apart that the winding number is asked far from the surface
+_COARSE = 4  # nodes between evaluations of the winding number far from the surface
 _SPECK = 2  # nodes, of a part apart from all others
 _MOST_NODES = 6_000_000
 _MOST_POINTS = 30_000
@@ -177,7 +177,7 @@ class _Grid:
         return self.corner + self.cell * np.stack(np.unravel_index(index, self.shape), axis=1)
 
     def filled(self, tree: cKDTree, winding: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Winding numbers on all nodes: each asked for near the surface, a few for the rest."""
+        """Winding numbers on all nodes: all of them near the surface, a few elsewhere."""
         near = self._near(tree, 2.5)
         coarse = [np.arange(0, count + _COARSE, _COARSE) for count in self.shape]
         nodes = np.stack(np.meshgrid(*coarse, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -106,11 +106,11 @@ class Roadmap:
         moved = np.linalg.norm(np.diff(parts, axis=1), axis=2).max(axis=0)
         least = self.cell.clearance(frames, np.full(len(joints), self.turntable_index)).least
         hit = np.flatnonzero(least <= _CLEAR_M)
-        asked = int(hit[0]) if len(hit) else len(joints)
-        if asked:
-            frames = frames if asked == len(joints) else self.cell.chain.frames(joints[:asked])
+        count = int(hit[0]) if len(hit) else len(joints)
+        if count:
+            frames = frames if count == len(joints) else self.cell.chain.frames(joints[:count])
             own = self.cell.self_clearance(frames)
-            least[:asked] = np.minimum(least[:asked], own)
+            least[:count] = np.minimum(least[:count], own)
         return least, moved
 
     def connect_by_rrt(self, joints: np.ndarray) -> int | None:
@@ -138,7 +138,7 @@ class Roadmap:
                 continue
             reached = nodes[start] + share * (aim - nodes[start])
             if share < 1.0 and not self.is_free(nodes[start], reached):
-                continue  # what is before a hit has not been looked at closely
+                continue  # what is before a hit has not been checked closely
             nodes.append(reached)
             parents.append(start)
             for node in self._nearest_index(self.nodes, reached, 3):

@@ -54,7 +54,7 @@ class PathProgram:
     """The actions of one tool path.
 
     joint_paths: those in the program, without those that no free move leads to. given: the same as
-    they were asked for, before joints were shifted by whole turns or free moves made longer.
+    they were given, before joints were shifted by whole turns or free moves made longer.
     """
 
     actions: tuple[Action, ...]

@@ -44,7 +44,7 @@ def simulation_report(result: SimulationResult) -> dict[str, Any]:
     pressed = [p for p in paths if p["force"] is not None]
     contact = sum(p["force"]["seconds"] for p in pressed)
     within = sum(p["force"]["within"] * p["force"]["seconds"] for p in pressed)
-    place, job = result.placement, result.simulation_job
+    placement, job = result.placement, result.simulation_job
     assumed = [f"{job.origin}; --up says otherwise"] if job.assumed else []
     used = sorted({a.turntable_index for p in result.paths for a in p.program.actions})
     simulated_s = sum(p["time_s"] for p in paths)
@@ -61,13 +61,13 @@ def simulation_report(result: SimulationResult) -> dict[str, Any]:
         },
         "object": result.distance_field.origin,
         "placement": {
-            "base_m": list(place.base_m),
-            "base_yaw_rad": place.base_yaw_rad,
-            "stand_m": place.stand_m,
+            "base_m": list(placement.base_m),
+            "base_yaw_rad": placement.base_yaw_rad,
+            "stand_m": placement.stand_m,
             "object_pose": job.origin,
             "up": job.upright[2].tolist(),
             "forward": job.upright[0].tolist(),
-            "turntable_used_rad": [place.turntable_rad[k] for k in used],
+            "turntable_used_rad": [placement.turntable_rad[k] for k in used],
             "reachable_of_sample": round(result.reachable, 4),
         },
         "shift_m": result.shift_m.tolist(),

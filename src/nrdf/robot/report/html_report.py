@@ -31,15 +31,15 @@ def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
 
 
 def _header(report: Mapping[str, Any]) -> list[str]:
-    place = report["placement"]
-    base = " ".join(f"{x:.2f}" for x in place["base_m"])
-    angles = len(place["turntable_used_rad"])
+    placement = report["placement"]
+    base = " ".join(f"{x:.2f}" for x in placement["base_m"])
+    angles = len(placement["turntable_used_rad"])
     return [
         report.get("date", ""),
         f"robot {report['robot']['name']}",
         f"base at {base} m from under the object, z up",
-        f"object {place['stand_m']:.2f} m above the floor, {angles} turntable angles",
-        place["object_pose"],
+        f"object {placement['stand_m']:.2f} m above the floor, {angles} turntable angles",
+        placement["object_pose"],
     ]
 
 

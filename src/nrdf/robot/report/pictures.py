@@ -238,7 +238,7 @@ def _build(
 def _parts(
     result: SimulationResult, colours: str
 ) -> list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
-    """The object's mesh cut by colour: vertices, faces and colour of each piece."""
+    """The object's mesh cut by colour: vertices, faces and colour of each part."""
     distance_field, bound_knowledge = result.distance_field, result.simulation_job.bound_knowledge
     points = bound_knowledge.cloud.points
     label = np.zeros(len(points), int)
@@ -281,9 +281,9 @@ def _add_lines(scene: Any, simulated: SimulatedPath, pose: np.ndarray) -> None:
     """The path's lines, dark where they are simulated, red where not."""
     for group, verdict in zip(simulated.path.groups, simulated.metrics.verdicts, strict=True):
         height = simulated.strategy.standoff_m
-        places = group.process.positions + (height - 0.002) * group.process.axes
-        places = places @ pose[:3, :3].T + pose[:3, 3]
-        for k in range(len(places) - 1):
+        points = group.process.positions + (height - 0.002) * group.process.axes
+        points = points @ pose[:3, :3].T + pose[:3, 3]
+        for k in range(len(points) - 1):
             if scene.ngeom >= scene.maxgeom:
                 return
             good = verdict[k] == "reached" and verdict[k + 1] == "reached"
@@ -294,6 +294,6 @@ def _add_lines(scene: Any, simulated: SimulatedPath, pose: np.ndarray) -> None:
                 np.zeros(9), np.array(colour, np.float32),
             )  # fmt: skip
             mujoco.mjv_connector(
-                geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.0016, places[k], places[k + 1]
+                geom, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.0016, points[k], points[k + 1]
             )
             scene.ngeom += 1

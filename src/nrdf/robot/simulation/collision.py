@@ -58,8 +58,10 @@ def find_collisions(
 
 
 def clearances(cell: Cell, joints: np.ndarray, index: np.ndarray) -> dict[str, np.ndarray]:
-    """Distances (t,), m, of joints (t, n) at turns (t,) from the object, the floor, and the arm
-    itself."""
+    """Distances (t,), m, of joints (t, n) from the object, the floor and the arm itself.
+
+    index: (t,) of the turntable.
+    """
     parts: dict[str, list[np.ndarray]] = {"object": [], "floor": [], "itself": []}
     for start in range(0, len(joints), _BATCH):
         frames = cell.chain.frames(joints[start : start + _BATCH])

@@ -107,17 +107,17 @@ def _reject(
         if action.kind == "process":
             path = next(p for p in program.given if (p.group, p.first) == key)
             parts[key] = _split(path, logs[index].waypoint[steps])
-    pieces = [piece for some in parts.values() for piece in some]
+    rest = [part for some in parts.values() for part in some]
     again: dict[int, JointPath | None] = {}
-    if pieces:
-        dense = [path for path, _ in densify(cell, groups, pieces)]
+    if rest:
+        dense = [path for path, _ in densify(cell, groups, rest)]
         found = add_approach_retract(cell, groups, dense)
-        again = {id(piece): path for piece, path in zip(pieces, found, strict=True)}
+        again = {id(part): path for part, path in zip(rest, found, strict=True)}
     left: list[JointPath | None] = []
     for path in program.given:
         key = (path.group, path.first)
         if key in parts:
-            left += [again[id(piece)] for piece in parts[key]]
+            left += [again[id(part)] for part in parts[key]]
         else:
             left.append(path)
     return [path for path in left if path is not None]

@@ -204,7 +204,7 @@ def _press(
     settling, dwelling = round(SETTLING_S / STEP_S), round(action.dwell_s / STEP_S)
     record = _Record(arm, count + settling + dwelling)
     # The correction is what the scan predicts, and what the force asks for beyond it.
-    asked, before, steady, i, waited, dwelt = -float(expected[0]), 0.0, 0, 0, 0, 0
+    correction, before, steady, i, waited, dwelt = -float(expected[0]), 0.0, 0, 0, 0, 0
     working = False
     tip, axis = arm.tip()
     still = np.zeros(motion.joints.shape[1])
@@ -221,7 +221,7 @@ def _press(
         if push > 0.0:
             pushed = -push * planned - (_FRICTION * push if working else 0.0) * travel[i]
         moving = working and i < count - 1
-        offset = expected[i] + asked
+        offset = expected[i] + correction
         arm.step(
             motion.joints[i] + offset * motion.along[i],
             motion.speeds[i] + rising[i] * motion.along[i] if moving else still,
@@ -231,8 +231,8 @@ def _press(
         )
         tip, axis = arm.tip()
         force = arm.force(axis)
-        asked += min(max(gain * (wanted - force), -most), most)
-        asked = min(max(asked, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
+        correction += min(max(gain * (wanted - force), -most), most)
+        correction = min(max(correction, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
         aside = away - depth * planned
         record.add(
             arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i], moving

@@ -129,7 +129,7 @@ def simulate(
             )
         )  # fmt: skip
     if not any(p.metrics.reached for p in simulated):
-        raise RobotError(f"the arm '{arm.name}' can drive none of the job's lines")
+        raise RobotError(f"the arm '{arm.name}' can execute none of the job's lines")
     return SimulationResult(
         simulation_job, arm, distance_field, placement, reachable, tuple(simulated), shift,
         clock.seconds,
