@@ -8,6 +8,6 @@ from nrdf.viz.picture import Panel, draw_regions
 
 panels = []
 for name in (REFERENCE, *TARGETS):
-    cloud, regions = bundled_chair(name)
+    cloud, regions = bundled_chair(name)  # cloud.points (8192, 3), name -> mask (8192,)
     panels.append(Panel(name, cloud.points, regions=regions, note=f"{len(cloud)} points"))
 draw_regions(panels, "chairs.png")

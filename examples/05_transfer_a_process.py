@@ -1,4 +1,4 @@
-"""Take what is done on one chair to another: tool paths, measured. Writes the folder job/.
+"""Transfer the processes of one chair to another: tool paths and their metrics, in job/.
 
 python examples/05_transfer_a_process.py
 """
@@ -10,7 +10,7 @@ process = nrdf.load_process(KNOWLEDGE)  # chair.yaml: five regions of a referenc
 target, _ = bundled_chair("rocker")  # PointCloud, 8192 points in metres
 
 result = process.transfer(target)  # finds the regions, plans or warps the tool paths
-for step in result.paths:  # in the order in which they are driven
+for step in result.paths:  # in the order in which they are run
     if step.path is None:
         print(f"{step.region:11s} {step.process.label:15s} left out: {step.reason}")
     else:

@@ -1,4 +1,4 @@
-"""Draw docs/images/studio.png, the studio with the bundled chair's processes brought to another
+"""Draw docs/images/studio.png, the studio with the bundled chair's processes transferred to another
 chair, and docs/images/studio-arm.png, the same on the arm in simulation.
 
     python tools/studio_picture.py CHROMIUM

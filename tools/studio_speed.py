@@ -38,8 +38,9 @@ def took(work: Callable[[], object], times: int = TIMES) -> float:
 
 
 def main() -> None:
-    """Print a line for each object_view."""
+    """Print a line for each measurement."""
     truth = bundled_chair(CHAIR)[1]
+    model = nrdf.load_model("chair")
     with tempfile.TemporaryDirectory() as folder:
         editor = Editor(Session(folder))
         editor.open_reference(CHAIR, bundled(CHAIR), "chair")
@@ -48,12 +49,12 @@ def main() -> None:
             editor.paint(REFERENCE, name, truth[name])
             editor.restart_step(name, 0, kind)
         editor.add_target(TARGETS[0], bundled(TARGETS[0]))
-        results = ResultCache(editor, LocalComputing(nrdf.load_model))
-        body = editor.paintable(REFERENCE)
+        results = ResultCache(editor, LocalComputing(lambda category: model))
+        cloud = editor.paintable(REFERENCE)
         middle = int(np.flatnonzero(truth["seat"])[0])
 
         def grow() -> None:
-            editor.paint(REFERENCE, "seat", truth["seat"] | body.canvas.patch(middle, 0.2))
+            editor.paint(REFERENCE, "seat", truth["seat"] | cloud.canvas.patch(middle, 0.2))
             colours_of(editor, results, REFERENCE)
 
         def plan() -> None:
@@ -67,14 +68,14 @@ def main() -> None:
         spent = took(lambda: results.transfer(document, silent), 1)
         print(f"both on {TARGETS[0]}, regions and tool paths: {spent:.2f} s")
         spent = took(lambda: results.correspondence_features(document, silent), 1)
-        described = results.correspondence_features(document, silent)
-        print(f"likeness, the first place on two objects: {spent:.2f} s")
-        spent = took(lambda: described.distances(middle))
-        print(f"likeness, each place that the cursor goes on to: {spent:.4f} s")
+        features = results.correspondence_features(document, silent)
+        print(f"similarity, the first point on two objects: {spent:.2f} s")
+        spent = took(lambda: features.distances(middle))
+        print(f"similarity, each point after it: {spent:.4f} s")
 
 
 def silent(done: int, total: int) -> None:
-    """Progress that nobody looks at."""
+    """Ignores progress."""
 
 
 if __name__ == "__main__":

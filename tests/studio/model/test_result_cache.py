@@ -1,47 +1,19 @@
-"""Plans on the reference, transfers to targets, and what is saved, without a browser."""
+"""Plans on the reference and transfers to targets, kept as long as they are current."""
 
 from __future__ import annotations
-
-import json
-import zipfile
-from io import BytesIO
 
 import numpy as np
 import pytest
 
 import nrdf
-from builders.taught_box import SIZE, cloud, faces
+from builders.studio_page import silent
+from builders.taught_box import cloud, faces
 from nrdf.errors import ProcessError, RegionError
-from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.transfer import ProcessTransfer
-from nrdf.studio.model.computing import LocalComputing
 from nrdf.studio.model.document import REFERENCE
-from nrdf.studio.model.editor import Editor
-from nrdf.studio.model.result_cache import ResultCache
-from nrdf.studio.model.saving import save_job, save_picture, save_programs, zipped
-from nrdf.studio.model.session import Session
 from nrdf.studio.model.teaching import bound_knowledge_of
 from nrdf.studio.model.worker import Cancelled
-from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, title_of
-from nrdf.toolpath.file import read_toolpaths
-
-
-def silent(done, total):
-    """Progress that nobody looks at."""
-
-
-@pytest.fixture
-def results(tmp_path, untrained):
-    editor = Editor(Session(tmp_path / "session"))
-    editor.open_reference("box.ply", cloud(), "chair")
-    for name, kind in (("top", "sand"), ("front", "oil")):
-        editor.add_region(name)
-        mask = np.zeros(len(cloud()), bool)
-        mask[faces(cloud())[name]] = True
-        editor.paint(REFERENCE, name, mask)
-        editor.restart_step(name, 0, kind)
-    editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
-    return ResultCache(editor, LocalComputing(lambda category: nrdf.load_model(untrained)))
+from nrdf.studio.scene.drawing import title_of
 
 
 def test_plans_hold_as_long_as_what_they_are_of(results):
@@ -141,57 +113,3 @@ def test_similarity_is_greatest_around_the_point_itself(results):
     found = results.correspondence_features(document, silent)
     assert found.distances(17)["new"].shape == (len(results.editor.paintable("new").points),)
     assert found.objects[REFERENCE] is described.objects[REFERENCE], "computed once"
-
-
-def test_what_is_drawn(results):
-    editor = results.editor
-    bare = colours_of(editor, results, "new")
-    assert (bare == bare[0]).all() and not lines_of(editor, results, "new")
-    results.make_plans(editor.document, silent)
-    results.transfer(editor.document, silent)
-    assert set(lines_of(editor, results, REFERENCE)) == {"top", "front"}
-    painted = colours_of(editor, results, REFERENCE)
-    assert (painted[editor.document.region("top").mask] != bare[0]).any()
-    assert direction_of(editor, "top", 0) is None
-    editor.change_step("top", 0, direction=[1.0, 0.0, 0.0])
-    start, stop = direction_of(editor, "top", 0)
-    np.testing.assert_allclose((stop - start) / np.linalg.norm(stop - start), [1, 0, 0])
-    sure = colours_of(editor, results, "new", by_confidence=True)
-    assert len(sure) == len(editor.paintable("new").points)
-
-
-def test_overlaps_are_dark(results):
-    from nrdf.viz.palette import SEVERAL_REGIONS
-
-    editor = results.editor
-    editor.paint(REFERENCE, "front", editor.document.region("top").mask)
-    drawn = colours_of(editor, results, REFERENCE)
-    assert (drawn[editor.document.region("top").mask] == np.array(SEVERAL_REGIONS)).all()
-
-
-def test_what_is_saved_can_be_read_by_the_command_line(results):
-    editor = results.editor
-    results.make_plans(editor.document, silent)
-    results.transfer(editor.document, silent)
-    result = results.by_target["new"]
-    place = save_job(editor, "new", result, {"command": "nrdf studio"})
-    assert save_job(editor, "new", result, {}) == place, "it can be saved again"
-    assert len(read_toolpaths(place).paths) == 2 and (place / "report.html").is_file()
-    assert list(read_bound_knowledge(place / "knowledge.yaml").regions) == ["top", "front"]
-    programs = save_programs(editor, "new", result, ("csv", "urscript"))
-    names = zipfile.ZipFile(BytesIO(zipped(programs))).namelist()
-    assert any(name.endswith(".csv") for name in names)
-    assert all(name.startswith("programs/") for name in names)
-    assert save_picture(editor, results).read_bytes().startswith(b"\x89PNG")
-    json.loads((place / "report.json").read_text())
-
-
-def test_a_large_target_is_shown_thinned_and_painted_whole(results):
-    editor = results.editor
-    editor.add_target("large.ply", cloud(SIZE, 20_000, seed=2))
-    body = editor.paintable("large")
-    assert len(body.points) < len(body.cloud)
-    mask = body.points[:, 1] > body.high[1] - 1e-6
-    whole = body.to_all(mask)
-    truth = body.cloud.points[:, 1] > body.high[1] - 1e-6
-    assert (whole == truth).mean() > 0.98 and (body.to_shown(whole) == mask).all()

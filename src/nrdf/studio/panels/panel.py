@@ -52,7 +52,7 @@ class Panel:
             control_width="large",
         )  # fmt: skip
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(440)
+        gui.main_panel.set_width(480)
         self.next = gui.add_markdown("")
         self.error = gui.add_markdown("", visible=False)
         self.working = ProgressBar(gui, cancel)

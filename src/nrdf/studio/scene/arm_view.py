@@ -94,9 +94,10 @@ class ArmView:
 
     def remove(self) -> None:
         """Remove the arm, and place the object as it is without one."""
-        self.object_view.place(self._origin + self._object)
         self._root.remove()
-        self._marks.remove()
+        if not self.object_view.removed:  # else all that is drawn of it is gone already
+            self.object_view.place(self._origin + self._object)
+            self._marks.remove()
 
     def _body(self, number: int) -> str:
         name = f"/arm/body{number}"

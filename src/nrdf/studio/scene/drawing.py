@@ -76,7 +76,8 @@ def title_of(editor: Editor, results: ResultCache, key: str) -> str:
     """The label of an object: its name, and the regions that a person should check."""
     if key == REFERENCE:
         reference = editor.document.reference
-        return "" if reference is None else f"{reference.name} (reference)"
+        name = "" if reference is None else reference.name
+        return name if name in ("", REFERENCE) else f"{name} (reference)"
     result = results.by_target.get(key)
     if result is None or not result.uncertain_regions:
         return key

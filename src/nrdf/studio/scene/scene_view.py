@@ -37,6 +37,7 @@ class ObjectView:
         self.key, self.paintable, self.scene_view = key, paintable, scene_view
         self.path = f"/object{number}"
         self.offset, self._rotation = np.zeros(3), np.eye(3)
+        self.removed = False
         scene = scene_view.server.scene
         self.frame = scene.add_frame(self.path, show_axes=False)
         self.points = scene.add_point_cloud(
@@ -168,6 +169,7 @@ class ObjectView:
 
     def remove(self) -> None:
         """Remove the object and all that is drawn of it."""
+        self.removed = True
         self.frame.remove()
 
     def _lifted(self, line: np.ndarray) -> np.ndarray:

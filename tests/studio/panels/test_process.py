@@ -1,0 +1,37 @@
+"""Numbers of a process that are refused, and the tool's clearance."""
+
+from __future__ import annotations
+
+
+def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
+    told = page.change(feed_mm_s=0.0)
+    assert told.startswith("⚠ region 'top'")
+    assert "feed_m_s (*Feed, mm/s*): must be above 0.0, not 0.0" in told
+    assert "feed_m_s: must be above 0.0" in page.transfer()
+    told = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
+    assert "stepover_m (*Stepover, mm*) is 2 (2000 mm), above what is plausible" in told
+
+
+def test_tool_clearance(page):
+    tab = page.studio.panel.process
+    page.does(tab.refresh)
+    assert tab.tool_clearance.value == 20.0
+    tab.tool_clearance.value = 35.0
+    page.does(tab._set_tool)
+    assert page.editor.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
+    tab.tool_clearance.value = -1.0
+    page.does(tab._set_tool)
+    page.does(tab.refresh)
+    assert "clearance_m" in tab.status.content and "-0.001" in tab.status.content
+
+
+def test_steps_are_added_selected_and_removed(page):
+    tab, studio = page.studio.panel.process, page.studio
+    tab.kind.value = "polish"
+    page.does(tab._change_steps, "Add")
+    assert studio.step == 1 and tab.step.options == ("1: sand", "2: polish")
+    page.does(tab._select_step, "1: sand")
+    assert studio.step == 0 and tab.kind.value == "sand"
+    page.does(tab._change_steps, "Remove")
+    assert [step["kind"] for step in page.editor.document.region("top").steps] == ["polish"]
+    assert "at least one process" in page.does(tab._change_steps, "Remove")

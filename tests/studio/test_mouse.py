@@ -1,0 +1,67 @@
+"""The mouse tools, by their events."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from builders.studio_page import face
+from builders.taught_box import cloud
+from nrdf.studio.model.document import REFERENCE
+
+
+def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
+    """Taking callbacks away would end the drag that is under way, and orbit the camera."""
+    taken_away = []
+    ground = page.studio.scene.objects[REFERENCE].drag_box
+    take_away = type(ground).remove_drag_callback
+
+    def remove_drag_callback(handle, *words):
+        taken_away.append(handle)
+        take_away(handle, *words)
+
+    monkeypatch.setattr(type(ground), "remove_drag_callback", remove_drag_callback)
+    page.does(page.studio.mouse.select_tool, "Brush")
+    assert ground.visible
+    page.does(page.studio.sync)
+    page.does(page.studio.mouse.select_tool, "Direction")
+    assert not taken_away
+    page.does(page.studio.mouse.select_tool, "Orbit")
+    assert ground in taken_away and not ground.visible
+
+
+def click(page, face_name):
+    """A click on the middle of a box's face."""
+    view = page.studio.scene.objects[REFERENCE]
+    chosen = np.flatnonzero(face(cloud(), face_name))
+    points = view.paintable.points[chosen]
+    index = chosen[np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+    scale = page.studio.scene.units_per_m
+    normal, point = view.paintable.normals[index], view.paintable.points[index]
+    origin = point * scale + view.offset + 2.0 * normal
+    event = SimpleNamespace(ray_origin=tuple(origin), ray_direction=tuple(-normal))
+    page.does(page.studio.mouse._clicked, event)
+    return int(index)
+
+
+def test_a_patch_grows_where_it_is_clicked_and_follows_the_radius(page):
+    page.paint("top", [])
+    click(page, "top")
+    assert not page.editor.document.region("top").mask.any(), "Orbit does not paint"
+    page.does(page.studio.mouse.select_tool, "Grow")
+    page.studio.radius_m = 0.1
+    index = click(page, "top")
+    small = page.editor.document.region("top").mask
+    assert small[index] and not small[face(cloud(), "front")].any()
+    page.does(page.studio.mouse.set_radius, 0.2)
+    assert page.editor.document.region("top").mask.sum() > 2 * small.sum()
+    page.studio.mouse.erase = True
+    click(page, "top")
+    assert not page.editor.document.region("top").mask[index]
+
+
+def test_a_target_without_a_result_is_not_painted(page):
+    page.does(page.studio.mouse.select_tool, "Grow")
+    view = page.studio.scene.objects["new"]
+    assert "nothing is transferred to new yet" in page.does(page.studio.mouse._check, view)
