@@ -16,13 +16,13 @@ Verb = Callable[..., Any]
 
 USAGE = """usage: nrdf VERB ... [-v]
 
-Teach a surface process once, on one object; run it on every object of that kind.
+Teach a surface process once, on one object; run it on every such object.
 """
 NOTES = """
-An example and all options: nrdf VERB --help. Debug messages: -v. nrdf --version.
-Ends with 0: all well; 1: some shapes not used; 2: bad input, and what to do; 3: a
-limit is not met, or doubtful with --strict; 4: nothing found or planned; 130: Ctrl-C.
-With 3 and 4 the result is written all the same."""
+All options, with an example: nrdf VERB --help. Debug messages: -v; --version.
+Exit codes: 0 all well; 1 some shapes not used; 2 bad input; 3 a limit is not
+met, or with --strict a result is doubtful; 4 nothing found or planned;
+130 Ctrl-C. With 3 and 4 the result is written all the same."""
 
 GROUPS = ("model", "eval")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
@@ -156,13 +156,14 @@ def _with_axes_joined(given: list[str]) -> list[str]:
 
 
 def _show_verbs() -> None:
+    known = verbs()
+    for_makers = [name for name in known if name in (*GROUPS, *BENCHMARK)]
     _say(USAGE)
-    for name, verb in verbs().items():
-        if name not in GROUPS:
-            _say(f"  {name:9} {_first_line(verb)}")
-    for name, group in verbs().items():
-        if name in GROUPS:
-            _say(f"  {name:9} {_first_line(group)}")
+    for name in [name for name in known if name not in for_makers]:
+        _say(f"  {name:9} {_first_line(known[name])}")
+    _say("")
+    for name in for_makers:
+        _say(f"  {name:9} {_first_line(known[name])}")
     _say(NOTES)
 
 

@@ -12,28 +12,7 @@ import trimesh
 from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
 from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.process.knowledge_file import read_knowledge
 from nrdf.toolpath.file import read_toolpaths
-
-
-@pytest.fixture
-def files(tmp_path):
-    """box.ply, top.ply, front.ply, and new.ply in millimetres."""
-    whole = cloud()
-    write_cloud(tmp_path / "box.ply", whole)
-    for name in ("top", "front"):
-        write_cloud(tmp_path / f"{name}.ply", whole.select(faces(whole)[name]))
-    other = cloud(SIZE, seed=1)
-    write_cloud(tmp_path / "new.ply", PointCloud(1000 * other.points, other.normals, "mm", "cell"))
-    return tmp_path
-
-
-@pytest.fixture
-def taught(files):
-    words = f"teach --reference {files}/box.ply --category chair --region {files}/top.ply "
-    words += f"{files}/front.ply --kind sand oil --out {files}/box.yaml"
-    assert cli.run(words.split()) == 0
-    return files
 
 
 def transfer(files, model, *more, kind="--any-kind", target=None):
@@ -160,63 +139,6 @@ def test_strict_takes_no_warning_and_the_result_is_written(taught, untrained, ca
     assert "nrdf: doubtful, with --strict:" in said and "taken to be mm" in said
     warnings = json.loads((taught / "job" / "report.json").read_text())["strict_warnings"]
     assert "taken to be mm" in warnings[0] and (taught / "job" / "toolpaths.json").exists()
-
-
-def test_a_placeholder_says_what_to_do(files, capsys):
-    words = f"teach --reference {files}/box.ply --category chair --out {files}/box.yaml"
-    assert cli.run(words.split()) == 0
-    assert "my-region.ply" in capsys.readouterr().out
-    assert cli.run(["check", str(files / "box.yaml")]) == 2
-    assert "region 'my-region': cannot read" in capsys.readouterr().err
-    assert cli.run(words.split()) == 2
-    assert "exists; give another name, or --overwrite" in capsys.readouterr().err
-    assert cli.run([*words.split(), "--overwrite"]) == 0
-
-
-def test_check_shows_what_it_can_and_ends_with_2(taught, capsys):
-    path = taught / "box.yaml"
-    path.write_text(path.read_text().replace("edge_margin_m: 0.01", "edge_margin_m: 0.4", 1))
-    assert cli.run(["check", str(path)]) == 2
-    said = capsys.readouterr()
-    assert "region 'top', sand: edge_margin_m is 0.4, which leaves nothing" in said.err
-    assert "asked for" in said.out and "nothing is wrong" not in said.out
-
-
-def test_check_finds_a_category_that_no_model_is_for(taught, untrained, capsys):
-    path = taught / "box.yaml"
-    path.write_text(path.read_text().replace("category: chair", "category: chiar", 1))
-    assert cli.run(["check", str(path)]) == 2
-    assert "category: no model for the category 'chiar'; did you mean" in capsys.readouterr().err
-    assert cli.run(["check", str(path), "--model", str(untrained)]) == 2
-    assert "is for chair" in capsys.readouterr().err
-    text = path.read_text()
-    path.write_text(text.replace("allow_unusual: false", "allow_unusual: true", 1))
-    assert path.read_text() != text
-    assert cli.run(["check", str(path)]) == 0
-
-
-def test_new_takes_an_unusual_category_where_it_is_meant(files, capsys):
-    words = f"teach --reference {files}/box.ply --category sofa --out {files}/sofa.yaml"
-    words += f" --region {files}/top.ply"
-    assert cli.run(words.split()) == 2
-    assert "--model" in capsys.readouterr().err and not (files / "sofa.yaml").exists()
-    assert cli.run([*words.split(), "--allow-unusual"]) == 0
-    assert cli.run(["check", str(files / "sofa.yaml")]) == 0
-
-
-def test_json_and_its_schema(taught, tmp_path, capsys):
-    words = f"teach --reference {taught}/box.ply --category chair --out {taught}/box.json"
-    assert cli.run([*words.split(), "--region", str(taught / "top.ply")]) == 0
-    assert json.loads((taught / "box.json").read_text())["version"] == 1
-    assert read_knowledge(taught / "box.json").regions[0].name == "top"
-    capsys.readouterr()
-    assert cli.run(["teach", "--schema"]) == 0
-    schema = json.loads(capsys.readouterr().out)
-    feed = schema["$defs"]["Process"]["properties"]["feed_m_s"]["description"]
-    assert feed.endswith("Plausible: 0.0001 to 5.")
-    assert schema["properties"]["regions"] and "2020-12" in schema["$schema"]
-    assert cli.run(["teach", "--schema", "--out", str(tmp_path / "s.json")]) == 0
-    assert json.loads((tmp_path / "s.json").read_text()) == schema
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,13 @@ import difflib
 import functools
 import inspect
 import io
+import os
 import re
 import shutil
 import textwrap
 import typing
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import Annotated, Any
 
 from nrdf.commands.options import metavar_of
@@ -35,7 +36,7 @@ def parse(verb: Verb, prog: str, words: list[str]) -> Callable[[], Any] | None:
         _check_flags(verb, prog, words)
     printed, complaint = io.StringIO(), io.StringIO()
     try:
-        with redirect_stdout(printed), redirect_stderr(complaint):
+        with _narrow(), redirect_stdout(printed), redirect_stderr(complaint):
             return tyro.cli(
                 _for_tyro(verb),
                 prog=prog,
@@ -53,9 +54,25 @@ def print_wrapped(text: str) -> None:
     """Print a help text, its paragraphs wrapped to the terminal; indented lines are already."""
     from nrdf.commands.console import console
 
-    width = min(shutil.get_terminal_size().columns, _WIDEST)
     for line in map(str.rstrip, text.rstrip().splitlines()):
-        console.print(line if line.startswith(" ") else textwrap.fill(line, width))
+        console.print(line if line.startswith(" ") else textwrap.fill(line, _width()))
+
+
+def _width() -> int:
+    return min(shutil.get_terminal_size().columns, _WIDEST)
+
+
+@contextmanager
+def _narrow() -> Iterator[None]:
+    """A block in which tyro, which asks for the terminal's width, writes lines that can be read."""
+    before = os.environ.get("COLUMNS")
+    os.environ["COLUMNS"] = str(_width())
+    try:
+        yield
+    finally:
+        del os.environ["COLUMNS"]
+        if before is not None:
+            os.environ["COLUMNS"] = before
 
 
 def closest(word: str, known: Iterable[str]) -> str:
@@ -159,7 +176,7 @@ def _in_brief(complaint: str) -> str:
     blocks = re.split(r"^\W*-{3,}\W*$", complaint, flags=re.MULTILINE)
     lines = (line.strip() for line in blocks[min(1, len(blocks) - 1)].splitlines())
     text = " ".join(line for line in lines if line and "NoneType" not in line)
-    value = re.match(r"Error parsing (--\S+|\S+): .*<class '\w+'>: (.*)", text)
+    value = re.match(r"Error parsing (\S+): .*- .*[\]>]: (.*)", text)
     if value:
         return f"{value[1]}: {value[2]}"
     return text.replace("Error parsing ", "").replace("{None}|", "").replace("{None,", "{")

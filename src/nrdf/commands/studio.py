@@ -22,10 +22,11 @@ def studio(
     robot: File | None = None,
     tool_frame: Annotated[str, Metavar("NAME")] | None = None,
 ) -> None:
-    """Paint regions, describe processes and see them on other objects, in a browser.
+    """Paint regions and describe processes in a browser.
 
-    Prints an address and opens it. Everything done there is kept in the session's folder at once;
-    the same command goes on with it. Ctrl-C ends. Needs: pip install 'nrdf[studio]'.
+    And see them on other objects. Prints an address and opens it. Everything done there is kept in
+    the session's folder at once; the same command goes on with it. Ctrl-C ends. Needs:
+    pip install 'nrdf[studio]'.
 
     Example: nrdf studio --session my-chairs
 

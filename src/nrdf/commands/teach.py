@@ -21,7 +21,7 @@ def teach(
     overwrite: bool = False,
     schema: bool = False,
 ) -> None:
-    """Begin a knowledge file: regions of a reference, and what is done on each.
+    """Begin a knowledge file: regions, and what is done on each.
 
     With --region the regions are in it, each with sensible values for its kind of process; without,
     a placeholder says where they go. The file is commented, to be filled in. A name that ends in

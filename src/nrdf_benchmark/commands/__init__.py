@@ -11,7 +11,7 @@ from typing import Any
 
 
 def evaluations() -> dict[str, Callable[..., Any]]:
-    """Measure how good it is and how fast: BSRC, labelled objects, exact truth, shapes, speed.
+    """Measure how good and how fast: benchmarks, exact truth, speed.
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
     """

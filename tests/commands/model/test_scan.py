@@ -1,3 +1,5 @@
+"""`nrdf model scan`: the scan and its truth are written together."""
+
 from __future__ import annotations
 
 import json
@@ -6,8 +8,36 @@ import numpy as np
 import trimesh
 
 from nrdf import cli
+from nrdf.errors import OutputError
 from nrdf.io.cloud import read_cloud
 from nrdf.io.ply import read_header, read_scalars
+
+
+def test_a_scan_over_its_own_mesh_is_refused(tmp_path, capsys):
+    (tmp_path / "mesh.ply").write_text("precious")
+    assert (
+        cli.run(["model", "scan", str(tmp_path / "mesh.ply"), "--out", str(tmp_path / "mesh.ply")])
+        == 2
+    )
+    assert "is read, and would be overwritten" in " ".join(capsys.readouterr().err.split())
+    assert (tmp_path / "mesh.ply").read_text() == "precious"
+
+
+def test_a_scan_and_its_truth_are_as_they_were_where_writing_fails(tmp_path, monkeypatch, capsys):
+
+    trimesh.creation.box((0.5, 0.6, 0.9)).export(tmp_path / "box.ply")
+    words = f"model scan {tmp_path}/box.ply --pixels 40 --out {tmp_path}/scan.ply".split()
+    assert cli.run(words) == 0
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    assert set(before) == {"box.ply", "scan.ply", "scan.json"}
+
+    def full(*_):
+        raise OutputError("cannot write scan.json: No space left on device")
+
+    monkeypatch.setattr("nrdf.io.atomic.write_json", full)
+    assert cli.run([*words, "--seed", "1"]) == 2
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+
 
 BALL = trimesh.creation.icosphere(4, 0.5)
 

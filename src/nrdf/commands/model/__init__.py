@@ -10,7 +10,7 @@ from typing import Any
 
 
 def model() -> dict[str, Callable[..., Any]]:
-    """Make training shapes, train a model of a category, add it to the model zoo."""
+    """Make training shapes, train a model, add it to the model zoo."""
     from nrdf.commands.model.add import add
     from nrdf.commands.model.boxes import boxes
     from nrdf.commands.model.correspond import correspond

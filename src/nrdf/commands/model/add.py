@@ -14,7 +14,7 @@ from nrdf.io.bounds import FINITE
 
 
 def add(
-    weights: Positional[Path],
+    weights: Positional[Annotated[Path, Metavar("FILE|FOLDER")]],
     name: str | None = None,
     scores: tuple[Annotated[str, Metavar("NAME=VALUE")], ...] = (),
     note: str = "",
