@@ -157,7 +157,7 @@ def _with_axes_joined(given: list[str]) -> list[str]:
 
 def _show_verbs() -> None:
     known = verbs()
-    for_makers = [name for name in known if name in (*GROUPS, *BENCHMARK)]
+    for_makers = [name for name in dict.fromkeys((*GROUPS, *BENCHMARK)) if name in known]
     _say(USAGE)
     for name in [name for name in known if name not in for_makers]:
         _say(f"  {name:9} {_first_line(known[name])}")

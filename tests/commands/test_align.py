@@ -31,8 +31,8 @@ def test_align_writes_pose_object_and_picture(scans, tmp_path, capsys):
     out = tmp_path / "aligned"
     assert run("align", scans / "scan.ply", "--model", "chair", "--up", "z", "--out", out) == 0
     report = json.loads((out / "report.json").read_text())
-    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["scans"]}
-    assert set(report["scans"]) == {"aligned.ply", "object.ply", "picture.png", "report.json"}
+    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["files"]}
+    assert set(report["files"]) == {"aligned.ply", "object.ply", "picture.png", "report.json"}
     found = similarity(report)
     assert yaw_error(found, PLACE) < 5 and found.scale == pytest.approx(850, rel=0.03)
     assert report["unit"] == {"name": "mm", "origin": "guessed"} and report["warnings"] == []

@@ -39,8 +39,8 @@ def test_retrieve_answers_in_the_targets_own_coordinates(retrieve, chair_files, 
     assert retrieve(method=[method]) == 0
     out = tmp_path / "deep" / "result"
     report = json.loads((out / "report.json").read_text())
-    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["chair_files"]}
-    assert set(report["chair_files"]) == {"seat.ply", "legs.ply", "picture.png", "report.json"}
+    assert {p.name for p in out.iterdir()} == {MANIFEST, *report["files"]}
+    assert set(report["files"]) == {"seat.ply", "legs.ply", "picture.png", "report.json"}
     assert report["method"] == method
     assert report["model"]["preset"] == "default"
     assert report["target"]["unit"] == "mm" and report["reference"]["unit"] == "m"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ import trimesh
 
 from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
+from nrdf.commands.transfer import job_folders
+from nrdf.commands.transfer_run import TransferRun
+from nrdf.errors import CloudError, ConfigError, LimitError, NothingFoundError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.toolpath.file import read_toolpaths
 
@@ -189,3 +193,94 @@ def test_a_region_marked_on_the_target_is_taken_instead_of_what_is_found(taught,
     words = ("--region", str(taught / "marked" / "lid.ply"), "--overwrite")
     assert transfer(taught, untrained, *words) == 2
     assert "no taught region 'lid'; known: top, front" in capsys.readouterr().err
+
+
+@pytest.fixture
+def four(taught, monkeypatch):
+    """The folder to work in: knowledge, two targets, and a broken one."""
+    monkeypatch.chdir(taught)
+    other = cloud(SIZE, seed=2)
+    write_cloud(taught / "other.ply", PointCloud(other.points, other.normals, "m"))
+    (taught / "broken.ply").write_text("no cloud")
+    return taught
+
+
+def test_one_target_has_a_folder_of_its_name_unless_told(four, untrained):
+    assert cli.run(f"transfer box.yaml new.ply --model {untrained} --any-kind".split()) == 0
+    assert (four / "job-new" / "toolpaths.json").exists()
+
+
+def test_several_targets_have_a_folder_each_and_the_reference_is_encoded_once(
+    four, untrained, capsys, monkeypatch
+):
+    from nrdf.regions.model import Model
+
+    encoded, set_reference = [], Model.set_reference
+    monkeypatch.setattr(
+        Model, "set_reference", lambda self, c: encoded.append(1) or set_reference(self, c)
+    )
+    words = f"transfer box.yaml new.ply broken.ply other.ply --model {untrained} --any-kind"
+    assert cli.run([*words.split(), "--out", "jobs"]) == 2
+    said = capsys.readouterr()
+    assert len(encoded) == 1
+    assert sorted(p.name for p in (four / "jobs").iterdir()) == ["new", "other"]
+    for name in ("new", "other"):
+        assert len(read_toolpaths(four / "jobs" / name).paths) == 2
+    assert "broken.ply: " in said.err and "Traceback" not in said.err
+    table = said.out[said.out.index("all targets") :].splitlines()
+    rows = {line.split()[0]: line for line in table[1:] if ".ply" in line}
+    assert list(rows) == ["new.ply", "broken.ply", "other.ply"]
+    assert "good" in rows["new.ply"] and "no result" in rows["broken.ply"]
+    assert "good" in rows["other.ply"]
+    # The folders that are there now are refused, each for itself; a new target is still done.
+    write_cloud(four / "third.ply", PointCloud(cloud(SIZE, seed=3).points, unit="m"))
+    again = words.replace("broken.ply", "third.ply").split()
+    assert cli.run([*again, "--out", "jobs"]) == 2
+    assert capsys.readouterr().err.count("is not empty") == 2
+    assert (four / "jobs" / "third" / "report.html").exists()
+
+
+def test_knowledge_that_is_wrong_is_so_at_once_for_all_targets(four, untrained, capsys):
+    assert cli.run(f"transfer no.yaml new.ply other.ply --model {untrained}".split()) == 2
+    assert capsys.readouterr().err.count("no.yaml") == 1
+
+
+@pytest.mark.parametrize(
+    ("errors", "code"),
+    [
+        ((None, None), 0),
+        ((None, LimitError("wide")), 3),
+        ((LimitError("wide"), NothingFoundError("none")), 4),
+        ((NothingFoundError("none"), CloudError("bad"), LimitError("wide")), 2),
+        ((OSError("disk"), None), 2),
+    ],
+)
+def test_the_exit_code_is_the_worst(four, monkeypatch, errors, code):
+    waiting = iter(errors)
+
+    def transferred(self, target, out):
+        error = next(waiting)
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr(TransferRun, "transfer", transferred)
+    monkeypatch.setattr(TransferRun, "process_transfer", None)
+    targets = [f"{number}.ply" for number in range(len(errors))]
+    assert cli.run(["transfer", "box.yaml", *targets]) == code
+
+
+def test_folders_of_targets():
+    a, b = Path("x/a.ply"), Path("y/b.ply")
+    assert job_folders([a], None) == [Path("job-a")]
+    assert job_folders([a], Path("out")) == [Path("out")]
+    assert job_folders([a, b], None) == [Path("job-a"), Path("job-b")]
+    assert job_folders([a, b], Path("out")) == [Path("out/a"), Path("out/b")]
+    with pytest.raises(ConfigError, match="two targets are called 'A'"):
+        job_folders([a, Path("z/A.stl")], None)
+    with pytest.raises(ConfigError, match="needs a TARGET"):
+        job_folders([], None)
+
+
+def test_marked_regions_are_of_one_target(four, capsys):
+    assert cli.run(["transfer", "box.yaml", "new.ply", "other.ply", "--region", "top.ply"]) == 2
+    assert "--region marks regions of one target" in capsys.readouterr().err

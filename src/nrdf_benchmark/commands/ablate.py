@@ -9,6 +9,7 @@ from typing import Literal
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, progress_bar, versions
+from nrdf.commands.options import File, Folder
 from nrdf.io.bounds import Count
 
 Variant = Literal["complete", "cd", "emd", "ncd", "ds", "dd"]
@@ -16,16 +17,16 @@ Variant = Literal["complete", "cd", "emd", "ncd", "ds", "dd"]
 
 def ablate(
     category: Positional[str],
-    data: tuple[Path, ...],
+    data: tuple[Folder, ...],
     schedule: Literal["short", "full"] = "short",
-    config: Path | None = None,
+    config: File | None = None,
     only: tuple[Variant, ...] = ("complete", "cd", "emd", "ncd", "ds", "dd"),
-    bsrc: Path | None = None,
+    bsrc: Folder | None = None,
     labels: Literal["published", "corrected"] = "published",
     pairs: Count = 20,
     device: str = "auto",
     workers: Count | None = None,
-    out: Path | None = None,
+    out: Folder | None = None,
     overwrite: bool = False,
 ) -> None:
     """Train without each loss of the last stage, and score (Table III).

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, errors, show, table, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import File, Folder
 
 
 @one_run_at("out")
-def arm(demo: Positional[Path], out: Path | None = None) -> None:
+def arm(demo: Positional[Folder], out: File | None = None) -> None:
     """Simulate the demonstration's chairs on the bundled arm, against the bars of
     docs/evidence/robot.md.
 

@@ -16,6 +16,7 @@ from nrdf.commands.console import (
     versions,
 )
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import Folder
 from nrdf.io.bounds import Count
 
 if TYPE_CHECKING:
@@ -25,12 +26,12 @@ if TYPE_CHECKING:
 
 @one_run_at("out")
 def bsrc(
-    data: Path,
+    data: Folder,
     category: Literal["chair", "car", "plane"],
-    out: Path | None = None,
+    out: Folder | None = None,
     method: tuple[str, ...] = ("nrdf", "nrdf-points", "copy", "box"),
     model: tuple[str, ...] = (),
-    runs: Path = Path("runs"),
+    runs: Folder = Path("runs"),
     labels: Literal["published", "corrected"] = "published",
     metric: str = "cd-l1",
     device: str = "cpu",

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
+from nrdf.commands.options import File, Folder
 from nrdf.io.bounds import Count, NonNegativeCount
 
 
 def kind(
     category: Literal["chair", "car", "plane"],
-    shapes: Path | None = None,
-    bsrc: Path | None = None,
-    labelled: Path | None = None,
-    others: Path | None = None,
+    shapes: Folder | None = None,
+    bsrc: Folder | None = None,
+    labelled: Folder | None = None,
+    others: Folder | None = None,
     count: Count = 200,
     scans_every: NonNegativeCount = 0,
     network: str | None = None,
-    out: Path | None = None,
+    out: File | None = None,
 ) -> None:
     """What the check of the kind of object warns of, and what it lets pass.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated, Literal
 
 from nrdf.commands.console import (
@@ -16,13 +15,14 @@ from nrdf.commands.console import (
     versions,
 )
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import Folder
 from nrdf.io.bounds import Bounds, Count, NonNegativeCount
 
 
 @one_run_at("out")
 def objects(
-    data: Path,
-    out: Path | None = None,
+    data: Folder,
+    out: Folder | None = None,
     category: tuple[str, ...] = (),
     group: tuple[str, ...] = ("chair+stool",),
     method: tuple[str, ...] = ("nrdf", "registration", "box-mask", "box-normals"),

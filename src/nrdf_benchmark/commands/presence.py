@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from nrdf.commands.console import console, progress_bar, show, table
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import Folder
 
 if TYPE_CHECKING:
     from nrdf.scans.pose_scorer import PoseScorer
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 
 @one_run_at("out")
 def presence(
-    out: Path,
-    objects: Path | None = None,
+    out: Folder,
+    objects: Folder | None = None,
     model: str = "chair",
     category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
     pairs: int = 12,

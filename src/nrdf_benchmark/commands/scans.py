@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import File, Folder
 from nrdf.io.bounds import Count, NonNegativeCount
 
 
@@ -15,11 +15,11 @@ def scans(
     category: Literal["chair", "car", "plane"],
     model: str | None = None,
     members: NonNegativeCount = 25,
-    meshes: Path | None = None,
+    meshes: Folder | None = None,
     every: Count = 1,
     pairs: NonNegativeCount = 25,
     device: str = "cpu",
-    out: Path | None = None,
+    out: File | None = None,
 ) -> None:
     """Alignment, and regions on scans, against exact truth.
 

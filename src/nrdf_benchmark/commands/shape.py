@@ -8,22 +8,23 @@ from typing import Annotated, Literal
 
 from nrdf.commands.console import command_line, console, progress_bars, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import Folder
 from nrdf.io.bounds import Bounds, Count, Fraction
 
 
 @one_run_at("out")
 def shape(
-    data: Path,
+    data: Folder,
     method: tuple[str, ...] = ("nrdf",),
     model: tuple[str, ...] = (),
-    runs: Path = Path("runs"),
+    runs: Folder = Path("runs"),
     split: Literal["test", "val", "train"] = "test",
     level: Fraction = 0.75,
     resolution: Annotated[int, Bounds(2, 1024)] = 64,
     points: Count = 8192,
     device: str = "cpu",
     workers: Count | None = None,
-    out: Path | None = None,
+    out: Folder | None = None,
 ) -> None:
     """The paper's Table I: surface and occupancy of shapes not trained on.
 

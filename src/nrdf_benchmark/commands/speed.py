@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nrdf.commands.console import console, errors, show, table, versions
 from nrdf.commands.one_run import one_run_at
+from nrdf.commands.options import File
 from nrdf.io.bounds import Count, NonNegativeCount
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def speed(
     device: str = "cpu",
     repeats: Count = 7,
     steps: NonNegativeCount = 3,
-    out: Path | None = None,
+    out: File | None = None,
 ) -> None:
     """Measure speed and memory of retrieval, transfer and training.
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 from nrdf.commands.console import console, progress_bar, show, table
+from nrdf.commands.options import Folder
 from nrdf.io.bounds import NonNegative, NonNegativeCount
 
 
 def toolpaths(
     category: Literal["chair", "car", "plane", "table"],
-    data: Path | None = None,
+    data: Folder | None = None,
     members: NonNegativeCount = 10,
     trajectory: Literal["raster", "cross-hatch", "spiral", "contour"] = "raster",
     edge_margin_mm: NonNegative = 0.0,

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+
 import numpy as np
 import pytest
 
+from nrdf.errors import OutputError
+from nrdf.robot.report import pictures
 from nrdf.robot.report.pictures import COVERAGE, STILL, _parts, draw_pictures
 
 
@@ -28,3 +32,13 @@ def test_the_mesh_is_cut_by_colour_and_stays_whole(plate):
     for vertices, faces, colour in parts:
         assert faces.max() == len(vertices) - 1 and len(colour) == 3
     assert np.isfinite(parts[0][0]).all()
+
+
+def test_a_picture_on_a_full_disk_is_an_output_error(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("nrdf.io.atomic.os.replace", full)
+    with pytest.raises(OutputError, match="No space left on device; free some space"):
+        pictures._save(tmp_path / "x.png", np.zeros((8, 8, 3), np.uint8))
+    assert list(tmp_path.iterdir()) == []
