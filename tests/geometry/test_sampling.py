@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from builders.oriented_clouds import sphere
-from nrdf.geometry.sampling import downsample, fibonacci_directions
+from nrdf.geometry.sampling import (
+    distinct_points,
+    downsample,
+    fibonacci_directions,
+    indices_in_subset,
+)
 
 
 def test_directions_are_unit_and_even():
@@ -59,3 +64,19 @@ def test_thinning_takes_points_that_fill_a_volume():
     index = downsample(points, 1000, np.random.default_rng(1))
     assert len(index) == 1000
     assert (points[index] < 0.5).all(axis=1).mean() == pytest.approx(1 / 8, abs=0.04)
+
+
+def test_of_points_in_one_place_one_stays_for_each_side():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 1e-9], [1, 0, 0]])
+    up = np.array([0.0, 0.0, 1.0])
+    assert distinct_points(points).tolist() == [0, 1]
+    normals = np.stack([up, up, up, up, -up])
+    assert distinct_points(points, normals).tolist() == [0, 1, 4]
+    different = np.arange(12.0).reshape(4, 3)
+    assert distinct_points(different).tolist() == [0, 1, 2, 3]
+
+
+def test_indices_become_positions_in_a_subset():
+    subset = np.array([1, 4, 6, 8])
+    assert indices_in_subset(subset, np.array([8, 4, 5, 4]), 10).tolist() == [1, 3]
+    assert indices_in_subset(subset, np.array([], int), 10).tolist() == []

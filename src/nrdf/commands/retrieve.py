@@ -132,7 +132,7 @@ def retrieve(
         title = f"{reference.name} (reference)"
         panels = [
             region_panel(title, reference_cloud, reference_indices(regions, reference_cloud)),
-            target_panel(target.name, encoded_target, {n: m.indices for n, m in matches.items()}),
+            target_panel(target.name, encoded_target, {n: m.working for n, m in matches.items()}),
         ]
         if scan is not None:
             matches = {name: match.in_scan(scan) for name, match in matches.items()}
@@ -196,13 +196,10 @@ def region_panel(
 
 
 def target_panel(title: str, encoded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
-    """An encoded cloud in the category's frame, with regions of the whole cloud's indices."""
-    import numpy as np
-
+    """An encoded cloud in the category's frame, with regions as indices of its working points."""
     from nrdf.viz.picture import Panel
 
-    shown = {name: np.isin(encoded.working, indices) for name, indices in regions.items()}
-    return Panel(title, encoded.points, encoded.normals, shown)
+    return Panel(title, encoded.points, encoded.normals, dict(regions))
 
 
 def describe_cloud(path: Path, cloud: PointCloud) -> dict[str, Any]:
