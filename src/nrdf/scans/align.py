@@ -26,7 +26,7 @@ WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
 _REFINED = 4  # of them that are refined, by the field's score alone
-_REFINED_FACING = 3, 2  # by the field's, and by the network's where there is one
+_REFINED_WITH_YAW = 3, 2  # by the field's, and by the network's where there is one
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
@@ -34,9 +34,9 @@ _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
 # views of family members and public meshes: nine in ten wrong poses are reported as ambiguous, and
 # two in ten right ones. The other, and what the network counts for, were chosen on 84 scans (half
 # of them single views) of cars that the network was not trained on: no right pose is ambiguous.
-_COST_SCALE, _COST_SCALE_FACING = 0.036, 0.1
-_FACING_COST = 0.1  # of what the network finds e times less likely than what it likes best
-_MOST_AGAINST = 3.0  # of those logarithms: the field can object, and then the pose is ambiguous
+_COST_SCALE, _COST_SCALE_WITH_YAW = 0.036, 0.1
+_YAW_COST = 0.1  # of a yaw that is e times less likely than the likeliest, by the network
+_LARGEST_YAW_COST = 3.0  # of those logarithms: the field can outweigh the network
 SURE = 0.8
 """Probability of a pose against any other one alone, below which both are likely."""
 
@@ -46,10 +46,10 @@ class Candidate:
     """One pose that may be the right one.
 
     pose: from canonical coordinates to the scan's. up: (3,) in the scan. yaw: (rad) about it.
-    cost: how badly the field explains the scan in this pose (`field_cost`), and how little the
-    network of yaws thinks of it. symmetry: share of the points that have a counterpart across the
-    mirror plane, 0 where none was found. probability: of this pose among the candidates, which add
-    up to 1.
+    cost: how badly the field explains the scan in this pose (`field_cost`), and how unlikely
+    the yaw is by the network of yaws. symmetry: share of the points that have a counterpart across
+    the mirror plane, 0 where none was found. probability: of this pose among the candidates, which
+    add up to 1.
     """
 
     pose: Similarity
@@ -147,19 +147,19 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
     chosen = sparse_subset(working.points, _COARSE_POINTS)
     costs: np.ndarray = scorer.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
-    facing = _facing(scorer, working, ups)
+    yaw_log_probability = _yaw_log_probability(scorer, working, ups)
     best = _minima(costs, _REFINED)
     if scorer.yaw is not None:
-        against = -np.array([log_probability_at(row, yaws) for row in facing])
-        by_field, check_by_network = _REFINED_FACING
-        best = np.unique([*best[:by_field], *_minima(against, check_by_network)])
+        yaw_costs = -np.array([log_probability_at(row, yaws) for row in yaw_log_probability])
+        by_field, by_network = _REFINED_WITH_YAW
+        best = np.unique([*best[:by_field], *_minima(yaw_costs, by_network)])
     lap("facing")
     refined = [found for index in best for found in _refine(working, tried[index])]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
     field_costs = scorer.fine(points, normals, *_completed(points, normals, refined))
-    costs = field_costs + _FACING_COST * _against(facing, ups, refined)
+    costs = field_costs + _YAW_COST * _yaw_costs(yaw_log_probability, ups, refined)
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
         found = refined[index]
@@ -170,7 +170,7 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
             cost, alone = float(costs[index]), float(field_costs[index])
             candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
     lap("fine")
-    scale = _COST_SCALE if scorer.yaw is None else _COST_SCALE_FACING
+    scale = _COST_SCALE if scorer.yaw is None else _COST_SCALE_WITH_YAW
     weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / scale)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
@@ -196,7 +196,9 @@ def _posed(
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
 
 
-def _facing(scorer: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.ndarray:
+def _yaw_log_probability(
+    scorer: PoseScorer, working: _Working, ups: list[np.ndarray]
+) -> np.ndarray:
     """Log probabilities (ups, bins) of the yaws about each up; all equal without a network."""
     if scorer.yaw is None:
         return np.zeros((len(ups), _YAWS))
@@ -206,21 +208,26 @@ def _facing(scorer: PoseScorer, working: _Working, ups: list[np.ndarray]) -> np.
     return np.array([scorer.yaw.log_probability(points @ t, normals @ t) for t in turns])
 
 
-def _against(facing: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]) -> np.ndarray:
+def _yaw_costs(
+    log_probability: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]
+) -> np.ndarray:
     """The network's cost of each hypothesis (h,): how much less likely, in logarithms, up
     to what makes it sure."""
     numbers = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
     likely = [
-        log_probability_at(facing[i], found.yaw) for i, found in zip(numbers, refined, strict=True)
+        log_probability_at(log_probability[i], found.yaw)
+        for i, found in zip(numbers, refined, strict=True)
     ]
-    return np.minimum(-np.array(likely), _MOST_AGAINST)
+    return np.minimum(-np.array(likely), _LARGEST_YAW_COST)
 
 
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:
     """Hypotheses near one: both ways along the mirror plane, or a few yaws where there is none."""
-    turn = upright(found.up)
+    upright_axes = upright(found.up)
     plane = mirror_plane(
-        working.points @ turn, working.normals @ turn, rotation_about_up(found.yaw)[:, 2]
+        working.points @ upright_axes,
+        working.normals @ upright_axes,
+        rotation_about_up(found.yaw)[:, 2],
     )
     if plane.agreement < _SYMMETRIC:
         return [_Hypothesis(found.up, found.yaw + nudge) for nudge in _NUDGES]
