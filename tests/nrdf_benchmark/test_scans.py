@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import nrdf
-from nrdf import cli
 from nrdf.errors import DataError
 from nrdf.regions.match import Match
 from nrdf.regions.presence import ABSENT, Presence
@@ -80,26 +78,6 @@ def test_poses_are_summed_up_by_kind_and_source():
     assert rows["1 view", "mesh: yaw within 5°"] == 1
     assert rows["1 view", "wrong poses with a warning"] == 1
     assert rows["1 view", "right poses with a warning"] == 0
-
-
-def test_the_command_scores_meshes_and_writes_every_figure(tmp_path, capsys):
-    import trimesh
-
-    body = trimesh.util.concatenate([
-        trimesh.creation.box((1.0, 0.15, 0.4)),
-        trimesh.creation.box((0.5, 0.15, 0.35), trimesh.transformations.translation_matrix(
-            (-0.1, 0.15, 0))),
-    ])  # fmt: skip
-    (tmp_path / "car").mkdir()
-    body.export(tmp_path / "car" / "box-car.ply")
-    (tmp_path / "index.csv").write_text("category,shape,split\ncar,box-car,test\ncar,other,train\n")
-    out = tmp_path / "scans.json"
-    words = ["eval", "scans", "--category", "car", "--members", "0", "--pairs", "0", "--meshes",
-             str(tmp_path), "--out", str(out)]  # fmt: skip
-    assert cli.run(words) == 0
-    assert "mesh: yaw within 5°" in capsys.readouterr().out
-    content = json.loads(out.read_text())
-    assert [p["name"] for p in content["poses"]] == ["box-car"] * 3
 
 
 def test_an_index_that_names_what_is_not_there_is_refused(tmp_path):

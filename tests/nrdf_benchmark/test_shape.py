@@ -11,7 +11,6 @@ import torch
 from scipy.spatial.distance import cdist
 
 from builders.tiny_field import Ball, balls, write_folder
-from nrdf import cli
 from nrdf.errors import ConfigError, DataError, OutputError
 from nrdf.field.base import Field, FieldConfig
 from nrdf.io.cloud import PointCloud
@@ -187,20 +186,3 @@ def test_shapes_of_two_categories_are_refused(tmp_path, untrained):
 def test_methods_without_a_field_are_refused():
     with pytest.raises(ConfigError, match="no method with an occupancy field 'copy'; known: "):
         check_methods(["nrdf", "copy"])
-
-
-def test_the_command_prints_the_table_or_says_what_is_missing(data, untrained, tmp_path, capsys):
-    def shape(*more):
-        words = ["eval", "shape", "--data", data, "--resolution", 12, "--workers", 1, *more]
-        return cli.run([str(word) for word in words])
-
-    assert shape("--split", "val", "--model", untrained, "--out", tmp_path / "out") == 0
-    assert "| `nrdf` |" in capsys.readouterr().out
-    assert (tmp_path / "out/table1-chair.json").is_file()
-    assert shape("--model", untrained) == 2
-    assert (
-        "has no shapes of the split 'test'; prepare some (nrdf model prepare"
-        in capsys.readouterr().err
-    )
-    assert shape("--split", "val", "--method", "nrdf-paper", "--runs", tmp_path) == 2
-    assert "no weights of method 'nrdf-paper' for category chair" in capsys.readouterr().err

@@ -9,7 +9,6 @@ import pytest
 
 from builders.bsrc_folder import member_clouds, write_bsrc
 from builders.surfaces import board
-from nrdf import cli
 from nrdf.errors import DataError
 from nrdf_benchmark.toolpaths import (
     NEAR_M,
@@ -70,13 +69,3 @@ def test_the_benchmarks_objects_are_scaled(tmp_path):
     for item in bsrc_objects(root, "chair"):
         assert np.ptp(item.points, axis=0).max() == pytest.approx(SIZE_M)
         assert item.exact is None and len(item.regions) == 8
-
-
-def test_the_command_shows_both_tables(monkeypatch, capsys):
-    monkeypatch.setattr("nrdf_benchmark.toolpaths.family_members", lambda *_: [flat()])
-    assert cli.run(["eval", "toolpaths", "--category", "table", "--members", "1"]) == 0
-    shown = capsys.readouterr().out
-    assert "table, families, raster: all regions, 1" in shown
-    assert "those that the footprint fits into, 1" in shown
-    assert shown.count("worst line spacing, stepovers") == 2
-    assert "s of CPU time for 8 regions" in shown

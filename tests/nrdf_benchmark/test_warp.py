@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import nrdf
-from nrdf import cli
 from nrdf.errors import DataError
 from nrdf.shapes.families import get_family
 from nrdf_benchmark import warp
@@ -57,14 +56,3 @@ def test_nothing_to_do_and_unknown_categories_are_refused(untrained):
         evaluate_warp(model, "chair", 0)
     with pytest.raises(DataError, match="no family 'lamp'"):
         evaluate_warp(model, "lamp")
-
-
-def test_the_verb_prints_the_figures(untrained, monkeypatch, capsys):
-    errors = (np.array([0.01, 0.02, 0.03]), np.array([0.05]))
-    result = WarpResult("chair", errors, 0.02, 0.5, np.array([0.9, 0.1]), np.array([True, False]))
-    monkeypatch.setattr(warp, "evaluate_warp", lambda *asked: result)
-    assert cli.run(["eval", "warp", "--category", "chair", "--model", str(untrained)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "2.50%" in said and "5.00%" in said and "4 waypoints" in said
-    assert "of 1 regions that targets have, 100.0% are found" in said
-    assert "of 1 that they lack, 0%" in said

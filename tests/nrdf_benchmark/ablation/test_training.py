@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import threading
 
 import pytest
 import torch
-import yaml
 
-from builders.bsrc_folder import member_clouds, write_bsrc
 from builders.tiny_field import balls, tiny_config, write_folder
-from nrdf import cli
 from nrdf.errors import ConfigError
 from nrdf.field import PRESETS
 from nrdf.field.weights import load_weights
@@ -147,38 +143,3 @@ def test_torchrun_is_refused(data, tmp_path, monkeypatch):
     monkeypatch.setenv("WORLD_SIZE", "2")
     with pytest.raises(ConfigError, match="does not run under torchrun"):
         run(data, tmp_path)
-
-
-def test_the_command_trains_scores_and_prints_on_either_ground(data, tmp_path, capsys):
-    file = tmp_path / "tiny.yaml"
-    file.write_text(yaml.safe_dump(CONFIG.model_dump(mode="json")))
-    out, bsrc = (
-        tmp_path / "out",
-        write_bsrc(tmp_path / "bsrc", "chair", member_clouds("chair", (0, 1))),
-    )
-
-    def ablate(*more):
-        words = [
-            "ablate",
-            "chair",
-            "--data",
-            data,
-            "--config",
-            file,
-            "--device",
-            "cpu",
-            "--workers",
-            1,
-        ]
-        return cli.run([str(word) for word in [*words, "--workers", 1, "--out", out, *more]])
-
-    assert ablate("--bsrc", tmp_path) == 2
-    assert "no BSRC objects in" in capsys.readouterr().err and not out.exists()
-    assert ablate("--only", "complete", "cd", "--bsrc", bsrc) == 0
-    shown = capsys.readouterr().out
-    assert "2 ordered pairs, labels as published" in shown and "| without CD |" in shown
-    assert ablate("--only", "cd", "--pairs", "1") == 0
-    assert "named regions of 1 pairs" in capsys.readouterr().out
-    content = json.loads((out / "table3.json").read_text())
-    assert content["schedule"] == "tiny" and content["versions"]["torch"]
-    assert content["variants"][0]["training"]["category"] == "chair"

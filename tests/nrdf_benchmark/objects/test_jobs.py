@@ -8,11 +8,11 @@ from builders.labelled_boxes import write_objects
 from nrdf.errors import OutputError
 from nrdf.field.zoo import find_weights
 from nrdf.process.transfer import ProcessTransfer
-from nrdf_benchmark.methods.registry import find_methods
 from nrdf_benchmark.objects import jobs as objects_jobs
-from nrdf_benchmark.objects.jobs import run_job
-from nrdf_benchmark.objects.picture import draw_worst
-from nrdf_benchmark.objects.retrieval import Settings, shared_retrieval
+from nrdf_benchmark.objects.jobs import JobResult, describe_jobs, run_job
+from nrdf_benchmark.objects.retrieval import (
+    Settings,
+)
 
 LOW, HIGH, STOOL = "chair/low", "chair/high", "stool/plain"
 
@@ -21,28 +21,6 @@ LOW, HIGH, STOOL = "chair/low", "chair/high", "stool/plain"
 def settings(tmp_path_factory):
     root = write_objects(tmp_path_factory.mktemp("objects"))
     return Settings(root, find_weights("chair"), 1500)
-
-
-def test_parts_are_found_in_scans_by_every_method_in_the_pose_that_was_found(settings):
-    retrieval, specs = shared_retrieval(settings), find_methods(["nrdf", "registration"], "chair")
-    results = [retrieval.run(spec, 3, LOW, HIGH) for spec in specs]
-    assert results[0].pose == results[1].pose
-    assert results[0].pose.degrees < 5 and results[0].pose.scale < 0.05
-    for result in results:
-        assert (
-            result.parts[0].true == (retrieval.target_cloud(HIGH, 3).labelled.label == "seat").sum()
-        )
-        for part in result.parts:
-            assert part.state == "there" and part.iou > 0.5, (result.method, part)
-
-
-def test_pictures_of_the_worst_pairs(settings, tmp_path):
-    retrieval, (spec,) = shared_retrieval(settings), find_methods(["box-mask"], "chair")
-    results = [retrieval.run(spec, 0, LOW, target) for target in (HIGH, STOOL)]
-    paths = draw_worst(retrieval, spec, results, tmp_path / "worst")
-    names = {path.name.split("-", 1)[1] for path in paths}
-    assert names == {"chair_low-to-chair_high.png", "chair_low-to-stool_plain.png"}
-    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
 
 
 def test_a_pair_goes_from_a_file_to_robot_programs(settings, monkeypatch):
@@ -78,3 +56,16 @@ def test_a_pair_without_a_tool_path_has_not_ended_well(settings, monkeypatch):
     job = run_job(settings, LOW, HIGH)
     assert not job.ended and not job.crashed
     assert job.reasons[-1].startswith("programs: no tool path: seat: ")
+
+
+def test_jobs_say_how_many_ended_and_what_failed():
+    first, *failed = describe_jobs([job(), job(reasons=("leg: absent",)), job(False, ("x", "y"))])
+    assert "2 of 3 pairs ended well, 1 with a tool path on every part" in first
+    assert "1.5 s a pair" in first and "1.00 GB" in first
+    assert failed == ["a/1 to a/2: y"]
+    assert "GB" not in describe_jobs([job(memory=None)])[0] and describe_jobs([]) == []
+
+
+def job(ended=True, reasons=(), memory=10**9):
+    seconds = {"transfer": 1.0, "programs": 0.5}
+    return JobResult("a/1", "a/2", ended, not reasons, reasons, False, 2, seconds, memory)

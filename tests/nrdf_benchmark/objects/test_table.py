@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 
 import pytest
 
-from nrdf_benchmark.objects.jobs import JobResult, describe_jobs
-from nrdf_benchmark.objects.pairs import draw_pairs
-from nrdf_benchmark.objects.picture import worst_pairs
 from nrdf_benchmark.objects.report import Report
 from nrdf_benchmark.objects.retrieval import ObjectPairResult, PartResult, Pose
 from nrdf_benchmark.objects.table import (
@@ -121,57 +117,9 @@ def test_poses_count_each_target_once_and_fronts_only_where_they_are_known():
     assert poses_of(RESULTS, rows_of(RESULTS, SETS)[0]) is None
 
 
-def test_worst_pairs_come_first_and_those_without_parts_not_at_all():
-    lost = [part("seat", iou=0.0), part("leg", iou=0.0)]
-    one, two = pair("nrdf", "a/1", "a/4", lost[0]), pair("nrdf", "a/1", "a/5", *lost)
-    empty = pair("nrdf", "a/1", "a/3", part("seat", "absent"))
-    good = pair("nrdf", "a/1", "a/6", part("seat", iou=0.9))
-    assert worst_pairs([good, one, empty, two]) == [two, one, good]
-    assert worst_pairs([good, one, empty, two], 1) == [two]
-
-
 def test_every_part_has_a_line():
     rows = list(csv.DictReader(io.StringIO(to_csv(RESULTS))))
     assert len(rows) == 10
     assert rows[1]["reason"] == "absent" and rows[1]["skipped"] == "true"
     assert rows[3]["iou"] == "" and rows[0]["evidence"] == "1 2"
     assert rows[-1]["reference_mixed"] == "0.2000" and rows[-1]["score"] == ""
-
-
-def job(ended=True, reasons=(), memory=10**9):
-    seconds = {"transfer": 1.0, "programs": 0.5}
-    return JobResult("a/1", "a/2", ended, not reasons, reasons, False, 2, seconds, memory)
-
-
-def test_jobs_say_how_many_ended_and_what_failed():
-    first, *failed = describe_jobs([job(), job(reasons=("leg: absent",)), job(False, ("x", "y"))])
-    assert "2 of 3 pairs ended well, 1 with a tool path on every part" in first
-    assert "1.5 s a pair" in first and "1.00 GB" in first
-    assert failed == ["a/1 to a/2: y"]
-    assert "GB" not in describe_jobs([job(memory=None)])[0] and describe_jobs([]) == []
-
-
-def test_the_same_pairs_are_drawn_every_time():
-    pairs = [(f"a/{i}", f"a/{i + 1}") for i in range(50)]
-    assert (
-        draw_pairs(pairs, 5)
-        == draw_pairs(pairs, 5)
-        == sorted(draw_pairs(pairs, 5), key=pairs.index)
-    )
-    assert len({*draw_pairs(pairs, 5)}) == 5 and draw_pairs(pairs, 0) == []
-    assert draw_pairs(pairs, 100) == pairs
-
-
-def test_files_hold_the_tables_and_everything(tmp_path):
-    nothing = pair("nrdf", "b/1", "b/2", part("seat", "absent", score=0.0))
-    sets = {**SETS, "b": [("b/1", "b/2")]}
-    report = Report([*RESULTS, nothing], sets, [job()], {"command": "nrdf eval objects"})
-    paths = report.write(tmp_path)
-    assert [path.name for path in paths] == ["objects.md", "objects.csv", "objects.json"]
-    text = paths[0].read_text()
-    assert "| `nrdf`: the default field, region as a mask | 0.600 | 0.000 | 0.400 |" in text
-    assert "less registration" not in text  # two targets are too few
-    content = json.loads(paths[2].read_text(), parse_constant=pytest.fail)
-    assert content["command"] == "nrdf eval objects" and content["rows"][-1]["mean"] is None
-    assert content["pairs"][0]["parts"][0]["evidence"] == [1.0, 2.0]
-    assert content["jobs"][0]["seconds"] == {"transfer": 1.0, "programs": 0.5}

@@ -1,31 +1,29 @@
-"""All measurements, as `nrdf eval speed` runs them."""
+"""All measurements of speed, one after the other."""
 
 from __future__ import annotations
 
-import json
-
 from nrdf.errors import NrdfError
-from nrdf_benchmark.commands.speed import speed
 from nrdf_benchmark.speed import measure as module
+from nrdf_benchmark.speed.training import TrainingSpeed
 
 
-def test_measure_reports_what_fails_and_goes_on(monkeypatch, tmp_path, untrained, capsys):
-    def alone(function, preset, *arguments):
-        if preset == "paper":
-            raise NrdfError("no such thing here")
-        return function(preset, *arguments)
+def test_what_a_preset_cannot_do_is_a_failure_and_the_others_are_measured(monkeypatch):
+    speed = TrainingSpeed("default", "shape", "cpu", 2, "float32", 0.5, 100.0, 10**9, None)
 
-    monkeypatch.setattr(module, "in_new_process", alone)
-    monkeypatch.setattr(module, "command_seconds", lambda *arguments: 4.5)
-    monkeypatch.setattr(module, "choose_weights", lambda *arguments: (untrained, "untrained"))
-    monkeypatch.setattr(module, "measure_training", lambda *arguments: [])
-    speed(repeats=1, steps=1, out=tmp_path / "speed.json")
-    said = json.loads((tmp_path / "speed.json").read_text())
-    assert [s["preset"] for s in said["retrieval"]] == ["default"]
-    assert said["retrieval"][0]["command_s"] == 4.5
-    assert {(f["preset"], f["what"]) for f in said["failures"]} == {
-        ("paper", "retrieval"),
-        ("paper", "training"),
-    }
-    shown = capsys.readouterr().out
-    assert "no such thing here" in shown and "4.500" in shown
+    def run(function, preset, *arguments):
+        if preset == "paper" or function is not module.measure_training:
+            raise NrdfError(f"{preset} cannot")
+        return [speed]
+
+    monkeypatch.setattr(module, "in_new_process", run)
+    told = []
+    retrieval, training, failures = module.measure(("default", "paper"), progress=told.append)
+    assert retrieval == [] and training == [speed]
+    assert [(f.preset, f.what, f.reason) for f in failures] == [
+        ("default", "retrieval", "default cannot"), ("paper", "retrieval", "paper cannot"),
+        ("paper", "training", "paper cannot"),
+    ]  # fmt: skip
+    assert told[:2] == ["default: retrieval", "default: training steps"]
+    content = module.to_json(retrieval, training, failures)
+    assert content["training"][0]["step_s"] == 0.5 and content["bars"] == module.BARS
+    assert module.measure(("default",), steps=0)[1] == []

@@ -1,0 +1,59 @@
+"""The files of an evaluation on labelled objects."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nrdf_benchmark.objects.jobs import JobResult
+from nrdf_benchmark.objects.report import Report
+from nrdf_benchmark.objects.retrieval import ObjectPairResult, PartResult
+
+
+def part(name, state="there", iou=None, reason="", score=None):
+    told = {} if score is None else {"confidence": 0.5, "observed": 1.0, "evidence": (1.0, 2.0)}
+    return PartResult(name, state, 100, 90, iou, reason, score, **told)
+
+
+def pair(method, reference, target, *parts, views=0, mixed=(0.0, 0.0), pose=None):
+    return ObjectPairResult(method, views, reference, target, 0.5, parts, mixed, pose)
+
+
+RESULTS = [
+    pair(
+        "nrdf", "a/1", "a/2",
+        part("seat", iou=0.8, score=0.7), part("leg", iou=0.0, reason="absent", score=0.0),
+        part("back", "absent", reason="not observed", score=0.0), part("arm", "", score=0.9),
+    ),
+    pair(
+        "nrdf", "a/2", "a/1",
+        part("seat", iou=0.4, score=0.1), part("back", "absent", score=0.1),
+        part("rail", "absent", score=0.5), mixed=(0.2, 0.0),
+    ),
+    pair("registration", "a/1", "a/2", part("seat", iou=0.9), part("leg", iou=0.5)),
+    pair("registration", "a/2", "a/1", part("seat", iou=0.6), mixed=(0.2, 0.0)),
+]  # fmt: skip
+
+
+SETS = {"a": [("a/1", "a/2"), ("a/2", "a/1")]}
+
+
+def job(ended=True, reasons=(), memory=10**9):
+    seconds = {"transfer": 1.0, "programs": 0.5}
+    return JobResult("a/1", "a/2", ended, not reasons, reasons, False, 2, seconds, memory)
+
+
+def test_files_hold_the_tables_and_everything(tmp_path):
+    nothing = pair("nrdf", "b/1", "b/2", part("seat", "absent", score=0.0))
+    sets = {**SETS, "b": [("b/1", "b/2")]}
+    report = Report([*RESULTS, nothing], sets, [job()], {"command": "nrdf eval objects"})
+    paths = report.write(tmp_path)
+    assert [path.name for path in paths] == ["objects.md", "objects.csv", "objects.json"]
+    text = paths[0].read_text()
+    assert "| `nrdf`: the default field, region as a mask | 0.600 | 0.000 | 0.400 |" in text
+    assert "less registration" not in text  # two targets are too few
+    content = json.loads(paths[2].read_text(), parse_constant=pytest.fail)
+    assert content["command"] == "nrdf eval objects" and content["rows"][-1]["mean"] is None
+    assert content["pairs"][0]["parts"][0]["evidence"] == [1.0, 2.0]
+    assert content["jobs"][0]["seconds"] == {"transfer": 1.0, "programs": 0.5}
