@@ -20,7 +20,7 @@ def test_axes_are_tilted_by_the_angle_to_every_side():
     np.testing.assert_allclose(tilted.mean(axis=1), np.cos(0.1) * axes, atol=1e-12)
 
 
-def test_the_next_waypoint_is_reached_and_a_far_one_is_a_jump(wall, start):
+def test_the_next_waypoint_is_reached_and_a_far_one_is_not(wall, start):
     process, cell = wall.path.segments[0], wall.cell
     index, joints = np.array([start.turntable_index]), start.joints[:1]
     moved, good = advance(cell, index, joints, joints, process.positions[1:2], process.axes[1:2])
@@ -29,6 +29,18 @@ def test_the_next_waypoint_is_reached_and_a_far_one_is_a_jump(wall, start):
     np.testing.assert_allclose(cell.chain.frames(moved).tcp, at, atol=1e-4)
     far = process.positions[:1] + np.array([-0.5, 0.3, 0.5])
     assert not advance(cell, index, joints, joints, far, process.axes[:1])[1].any()
+
+
+def test_joints_that_move_too_far_for_the_tools_step_are_a_jump(wall, start, monkeypatch):
+    process = wall.path.segments[0]
+    index, joints = np.array([start.turntable_index]), start.joints[:1]
+    to_next = wall.cell, index, joints, joints, process.positions[1:2], process.axes[1:2]
+    moved, _ = advance(*to_next)
+    step = np.linalg.norm(process.positions[1] - process.positions[0]) / 0.3
+    largest = np.abs(moved - joints).max() - 2.0 * step
+    for allowed, good in ((largest + 1e-3, True), (largest - 1e-3, False)):
+        monkeypatch.setattr("nrdf.robot.planning.path_tracking._STEP_RAD", allowed)
+        assert advance(*to_next)[1].all() == good
 
 
 def test_an_axis_that_is_free_is_not_tilted(wall, start):
