@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import os
 import re
+import shlex
 import subprocess
 import sys
 from importlib.metadata import metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import nrdf
+from nrdf import cli
+from nrdf.bundled import KNOWLEDGE, bundled_chair
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -33,6 +38,10 @@ def commands(page: Path) -> list[str]:
 
 def named(page: Path) -> str:
     return str(page.relative_to(ROOT))
+
+
+WITH_CODE = [page for page in PAGES if blocks(page, "python")]
+WITH_COMMANDS = [page for page in PAGES if commands(page)]
 
 
 def test_the_site_builds_and_all_its_links_lead_somewhere(tmp_path):
@@ -92,6 +101,65 @@ def headings(page: Path) -> set[str]:
     lines = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     plain = [re.sub(r"[^\w\s-]", "", line.lower()) for line in lines]
     return {re.sub(r"\s+", "-", line.strip()) for line in plain}
+
+
+@pytest.fixture(scope="module")
+def workplace(tmp_path_factory):
+    """A folder with the files that the pages name: ref.ply, seat.ply, new.ply, scan.ply, ..."""
+    folder = tmp_path_factory.mktemp("docs")
+    reference, regions = bundled_chair("reference")
+    nrdf.write_cloud(folder / "ref.ply", reference)
+    for name, region in (("seat.ply", "seat"), ("back.ply", "back-front")):
+        mask = regions[region]
+        part = nrdf.PointCloud(reference.points[mask], unit="m")
+        nrdf.write_cloud(folder / name, part)
+    target, _ = bundled_chair("rocker")
+    nrdf.write_cloud(folder / "new.ply", target)
+    # As a scanner would have it: z up.
+    turned = target.points @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    nrdf.write_cloud(folder / "scan.ply", nrdf.PointCloud(turned, unit="m"))
+    process = nrdf.load_process(KNOWLEDGE)
+    nrdf.write_job(folder / "job", process.transfer(target))
+    for path in KNOWLEDGE.parent.iterdir():
+        if path.suffix in (".yaml", ".npz", ".ply"):
+            (folder / path.name).write_bytes(path.read_bytes())
+    return folder
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=named)
+def test_python_runs_as_it_stands(page, workplace, monkeypatch, capsys):
+    monkeypatch.chdir(workplace)
+    code = "\n".join(blocks(page, "python"))
+    exec(compile(code, named(page), "exec"), {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("page", WITH_COMMANDS, ids=named)
+def test_commands_are_ones_that_exist(page, monkeypatch):
+    called = []
+
+    def harmless(verb):
+        @functools.wraps(verb)
+        def nothing(*given, **named):
+            called.append(verb)
+            return 0
+
+        return nothing
+
+    def group(verb):
+        members = {name: harmless(inner) for name, inner in verb().items()}
+        return functools.wraps(verb)(lambda: members)
+
+    known = {
+        name: group(verb) if name in cli.GROUPS else harmless(verb)
+        for name, verb in cli.verbs().items()
+    }
+    monkeypatch.setattr(cli, "verbs", lambda: known)
+    for line in commands(page):
+        words = shlex.split(line.replace("…", "0.5"), comments=True)
+        if len(words) > 1 and words[-1] not in ("--help", "--version"):
+            assert cli.run(words[1:]) == 0, line
+            assert called, line
+            called.clear()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import re
 from collections.abc import Iterator
 from importlib import import_module
@@ -62,6 +63,7 @@ def _verbs() -> Iterator[tuple[str, ...]]:
 def _help(words: list[str]) -> str:
     from nrdf import cli
 
+    os.environ["COLUMNS"] = "80"
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
         cli.run([*words, "--help"])
