@@ -2,6 +2,7 @@
 # make studio: an environment, then the studio in a browser; its session is kept in studio/
 # make test: an environment with the tools, then ruff, mypy and all tests
 # make docs: the documentation as a site, in build/site/
+# make wheel: the package as a file, in build/dist/; checked in an environment of its own
 # make fuzz: damaged files of every kind until stopped, or for as long as: make fuzz MINUTES=10
 # Another interpreter: make PYTHON=/path/to/python3.12 test
 
@@ -12,7 +13,7 @@ SUITABLE := -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10)
 PYTHON ?= $(shell for name in $(CANDIDATES); do \
 	$$name $(SUITABLE) 2>/dev/null && { echo $$name; break; }; done)
 
-.PHONY: demo studio test docs fuzz format clean
+.PHONY: demo studio test docs wheel fuzz format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/nrdf.stamp
@@ -29,6 +30,9 @@ test: $(VENV)/dev.stamp
 
 docs: $(VENV)/dev.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
+
+wheel: $(VENV)/dev.stamp
+	$(BIN)/python tools/check_wheel.py --keep build/dist
 
 fuzz: $(VENV)/dev.stamp
 	$(BIN)/python tools/fuzz.py $(MINUTES)
@@ -55,4 +59,4 @@ $(VENV)/dev.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	@touch $@ $(VENV)/nrdf.stamp $(VENV)/studio.stamp
 
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) build demo
