@@ -27,13 +27,17 @@ MIN_FLATNESS = 1e-3  # least ratio of the smallest to the largest extent (standa
 class PointCloud:
     """Points on an object's surface.
 
-    points: (n, 3) float64, finite; normals: (n, 3) float64, outward, or None, brought to unit
-    length;
-    unit: "m", "mm", … or None where the file does not say; frame: name of the coordinate frame, or
-    None; colours: (n, 3) uint8 or None; intensity: (n,) float32 or None; sensors: (s, 3) float64,
-    where the sensors stood that saw the points, in the same frame and unit, or None if unknown;
-    mesh: what the points were sampled from, in the same frame and unit, or None where there is
-    none. It stays the whole mesh when points are selected.
+    Attributes:
+        points: (n, 3) float64, finite.
+        normals: (n, 3) float64, outward, or None; brought to unit length.
+        unit: "m", "mm", … or None where the file does not say.
+        frame: name of the coordinate frame, or None.
+        colours: (n, 3) uint8, or None.
+        intensity: (n,) float32, or None.
+        sensors: (s, 3) float64, where the sensors stood that saw the points, in the same frame
+            and unit; None if unknown.
+        mesh: what the points were sampled from, in the same frame and unit; None where there is
+            none. It stays the whole mesh when points are selected.
     """
 
     points: np.ndarray
@@ -87,24 +91,27 @@ class PointCloud:
 def read_cloud(
     path: str | Path, mesh_samples: int = 30_000, topic: str | None = None
 ) -> PointCloud:
-    """Point cloud of the file `path`; the format is told from its content and its name's ending.
+    """Point cloud of a file; the format is told from its content and its name's ending.
 
-    A mesh (faces in a PLY, OFF, OBJ, STL or GLB file) is sampled: `mesh_samples` points spread
-    evenly over what is visible from outside, always the same ones, with outward normals, and kept
-    as `PointCloud.mesh`; its vertices would be a poor cloud. With `mesh_samples` 0 the vertices are
-    taken all the same.
-    Normals in the file are used as they are, brought to unit length; they are left out if some are
-    missing.
-    A PLY comment ``unit mm``, ``frame name`` or ``sensor x y z`` (one each) sets the unit, the
-    frame, or where a sensor stood, and so does a PCD file's VIEWPOINT. Of a ROS 2 bag (a folder, or
-    an MCAP or SQLite file) the first cloud of `topic` is read, which may be left out where only one
-    topic has clouds.
+    A mesh (faces in a PLY, OFF, OBJ, STL or GLB file) is sampled: points spread evenly over what
+    is visible from outside, always the same ones, with outward normals. It is kept as
+    `PointCloud.mesh`; its vertices would be a poor cloud. Normals in the file are used as they
+    are, brought to unit length; they are left out if some are missing. A PLY comment `unit mm`,
+    `frame name` or `sensor x y z` (one each) sets the unit, the frame, or where a sensor stood,
+    and so does a PCD file's VIEWPOINT.
 
-    Raises CloudError if the file is missing, no regular file (a pipe, say), unreadable, truncated,
-    in no known format, or empty, has coordinates above 1e12, holds more than its header claims,
-    or if 1 % or more of its points have NaN or infinite coordinates; fewer are dropped, with a
-    warning that counts them. In PCD files and bags such points mean that a pixel measured nothing:
-    any number of them is dropped.
+    Args:
+        path: the file; or the folder of a ROS 2 bag.
+        mesh_samples: points that a mesh is sampled to; with 0 its vertices are taken.
+        topic: of a ROS 2 bag (a folder, or an MCAP or SQLite file), whose first cloud is read. It
+            may be left out where only one topic has clouds.
+
+    Raises:
+        CloudError: the file is missing, no regular file (a pipe, say), unreadable, truncated, in
+            no known format, or empty; has coordinates above 1e12; holds more than its header
+            claims; or 1 % or more of its points have NaN or infinite coordinates. Fewer are
+            dropped, with a warning that counts them. In PCD files and bags such points mean that
+            a pixel measured nothing: any number of them is dropped.
     """
     path = Path(path)
     start = b""
@@ -245,11 +252,17 @@ def write_cloud(
     colours: np.ndarray | None = None,
     scalars: Mapping[str, np.ndarray] | None = None,
 ) -> None:
-    """Write `cloud` as binary PLY, all of it or nothing.
+    """Write a cloud as binary PLY, all of it or nothing.
 
-    colours: (n, 3) uint8, red, green, blue, instead of the cloud's own; scalars: further
-    properties by name, each (n,), for instance ``{"confidence": …}``. Raises OutputError if the
-    file cannot be written, CloudError if an array does not fit or a name is no PLY property name.
+    Args:
+        path: the file, replaced whole.
+        cloud: what is written.
+        colours: (n, 3) uint8, red, green, blue, instead of the cloud's own.
+        scalars: further properties by name, each (n,), for instance `{"confidence": …}`.
+
+    Raises:
+        OutputError: the file cannot be written.
+        CloudError: an array does not fit, or a name is no PLY property name.
     """
     columns = {name: cloud.points[:, i] for i, name in enumerate("xyz")}
     if cloud.normals is not None:

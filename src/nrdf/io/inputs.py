@@ -25,12 +25,20 @@ _ACCEPTED = (
 
 
 def as_cloud(given: Any, name: str = "the cloud", mesh_samples: int = MESH_SAMPLES) -> PointCloud:
-    """`given` as a cloud: a PointCloud as it is; a path (str or Path) as `read_cloud` reads it; an
-    array, or what NumPy makes one of, as points (n, 3); trimesh's Trimesh and Scene, and Open3D's
-    TriangleMesh, sampled as a mesh file is; trimesh's and Open3D's PointCloud as they are.
+    """An object as users have it, as a cloud.
 
-    name: what it is, for messages. Points of arrays and clouds keep their order and number. Raises
-    CloudError for a file or object that cannot be used, and for anything else.
+    Points of arrays and clouds keep their order and number.
+
+    Args:
+        given: a PointCloud is taken as it is; a path (str or Path) as `read_cloud` reads it; an
+            array, or what NumPy makes one of, as points (n, 3). Trimesh's Trimesh and Scene, and
+            Open3D's TriangleMesh, are sampled as a mesh file is. Trimesh's and Open3D's
+            PointCloud are taken as they are.
+        name: what it is, for messages.
+        mesh_samples: points that a mesh is sampled to.
+
+    Raises:
+        CloudError: a file or object cannot be used, or is anything else.
     """
     if isinstance(given, PointCloud):
         return given

@@ -65,8 +65,11 @@ _THREADS = 4  # that plan: numpy leaves them little to do at once
 class ProcessTransfer:
     """Knowledge on its reference, as a model sees it.
 
-    bound_knowledge: the knowledge with its reference's cloud and regions. reference: that cloud,
-    encoded. Raises ModelError for a model of another category.
+    Raises ModelError for a model of another category.
+
+    Attributes:
+        bound_knowledge: the knowledge with its reference's cloud and regions.
+        reference: that cloud, encoded.
     """
 
     def __init__(self, bound_knowledge: BoundKnowledge, model: Model) -> None:
@@ -94,23 +97,29 @@ class ProcessTransfer:
     ) -> TransferResult:
         """Find the regions on a target, and bring every process there.
 
-        target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in the
-            category's orientation, or an EncodedCloud in any pose, in metres.
-        unit: of the target, where its file did not say.
-        min_confidence: a region that is found nowhere, or with less mean confidence, is skipped. A
-            process that does not fit its region on the target is left out, with the reason.
-        marked: regions that a person has marked on the target, by name, as `region_indices` takes
-            them, points in metres. They are taken as they are. A mask that is False everywhere says
-            that the region is not there.
-        progress: called with (done, all) steps.
-        target_warnings: what is uncertain about the target's pose and unit. Unless given, its unit
-            is checked here, and logged as a warning where it is uncertain.
-        whole: the target before it was thinned, in metres, which tool paths are compared with.
-        kind: what the target was found to look like; checked here unless given.
+        Args:
+            target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in
+            the
+                category's orientation, or an EncodedCloud in any pose, in metres.
+            unit: of the target, where its file did not say.
+            min_confidence: a region that is found nowhere, or with less mean confidence, is
+            skipped.
+                A process that does not fit its region on the target is left out, with the reason.
+            marked: regions that a person has marked on the target, by name, as `region_indices`
+            takes
+                them, points in metres. They are taken as they are. A mask that is False everywhere
+                says that the region is not there.
+            progress: called with (done, all) steps.
+            target_warnings: what is uncertain about the target's pose and unit. Unless given, its
+                unit is checked here, and logged as a warning where it is uncertain.
+            whole: the target before it was thinned, in metres, which tool paths are compared with.
+            kind: what the target was found to look like; checked here unless given.
 
-        Raises CloudError for a target that cannot be used, ProcessError for one whose unit is not
-        known, RegionError for a marked region that is not taught or not on the target, ConfigError
-        for a `min_confidence` that is no share.
+        Raises:
+            CloudError: the target cannot be used.
+            ProcessError: the target's unit is not known.
+            RegionError: a marked region is not taught, or not on the target.
+            ConfigError: `min_confidence` is no share.
         """
         FRACTION.check("min_confidence", min_confidence)
         start = time.perf_counter()
@@ -283,9 +292,14 @@ class ProcessTransfer:
 def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
     """Process knowledge from its file, on its reference, ready to be transferred to targets.
 
-    `model` is the knowledge's category in the zoo unless given. Raises ProcessError for knowledge
-    that is wrong somewhere, naming field and value, CloudError for a reference that cannot be used,
-    and ModelError for a model of another category.
+    Args:
+        knowledge: path of the knowledge file.
+        model: the knowledge's category in the zoo unless given.
+
+    Raises:
+        ProcessError: knowledge is wrong somewhere; field and value are named.
+        CloudError: the reference cannot be used.
+        ModelError: the model is of another category.
     """
     bound_knowledge = read_bound_knowledge(knowledge)
     category = bound_knowledge.knowledge.category

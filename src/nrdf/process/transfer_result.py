@@ -49,11 +49,18 @@ class PathResult:
 class TransferResult:
     """Everything on one target, in metres in its own frame; paths in the order they are driven.
 
-    bound_knowledge: what was transferred. target: with normals, estimated where its file had none.
-    warnings: regions that are skipped or overlap. seconds: time by phase. pose: from canonical
-    coordinates to the target's: how the object lies there. target_warnings: what is uncertain about
-    the object's pose and unit. kind: what it looks like. All warnings together:
-    `nrdf.process.limits.strict_warnings`.
+    Attributes:
+        bound_knowledge: what was transferred.
+        target: with normals, estimated where its file had none.
+        regions: what was found of each region, by name.
+        paths: one a process and region, with its tool path and metrics, or the reason for none.
+        warnings: regions that are skipped or overlap.
+        seconds: time by phase.
+        pose: from canonical coordinates to the target's: how the object lies there.
+        target_warnings: what is uncertain about the object's pose and unit.
+        kind: what it looks like.
+
+    All warnings together: `nrdf.process.limits.strict_warnings`.
     """
 
     bound_knowledge: BoundKnowledge

@@ -16,15 +16,17 @@ FOUND = Presence("", 1.0, 1.0, 1.0)
 class Match:
     """A region found on a target, or the reason why it was not.
 
-    indices: (k,) the target's own points in the region, ascending; none where `presence` has a
-        reason.
-    points: (m, 3) where C puts each point of the reference's region, in its order, in the
-        target's frame and unit (raw prediction, off the surface by the field's error).
-    confidence: (k,) in [0, 1], for each of `indices`; their mean is the overlap with the true
-        region that is to be expected (`nrdf.regions.presence`).
-    method: "mask" or "points"; "marked" where a person has marked it on the target.
-    presence: whether the target has the region and the scan shows it.
-    working: (w,) the same region as indices of the encoded target's working points, ascending.
+    Attributes:
+        indices: (k,) the target's own points in the region, ascending; none where `presence` has
+            a reason.
+        points: (m, 3) where C puts each point of the reference's region, in its order, in the
+            target's frame and unit (raw prediction, off the surface by the field's error).
+        confidence: (k,) in [0, 1], for each of `indices`; their mean is the overlap with the true
+            region that is to be expected (`nrdf.regions.presence`).
+        method: "mask" or "points"; "marked" where a person has marked it on the target.
+        presence: whether the target has the region and the scan shows it.
+        working: (w,) the same region as indices of the encoded target's working points,
+            ascending.
     """
 
     indices: np.ndarray

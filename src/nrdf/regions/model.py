@@ -27,8 +27,12 @@ class Model(CloudEncoder):
     def set_reference(self, reference: Any) -> EncodedReference:
         """Encode a reference and compute its surface's descriptors once, for any number of targets.
 
-        reference: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh, in the
-        canonical orientation (+X forward, +Y up). Raises CloudError as `encode` does.
+        Args:
+            reference: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh, in
+                the canonical orientation (+X forward, +Y up).
+
+        Raises:
+            CloudError: the reference cannot be used, as `encode` says.
         """
         return EncodedReference(self, self.encode(as_cloud(reference, "the reference")))
 
@@ -36,9 +40,14 @@ class Model(CloudEncoder):
 def load_model(name: str | Path, device: str = "cpu") -> Model:
     """The model of a zoo name ("chair"), of a weight file, or of a finished training run's folder.
 
-    `device` is "cpu", "cuda", "cuda:1", … or "auto" (CUDA where there is one). Raises ModelError
-    for a name that is not known (listing those that are) and for a truncated or altered file,
-    ConfigError for a device that this machine does not have.
+    Args:
+        name: zoo name, or path.
+        device: "cpu", "cuda", "cuda:1", … or "auto" (CUDA where there is one).
+
+    Raises:
+        ModelError: the name is not known (those that are, are listed), or the file is truncated
+            or altered.
+        ConfigError: this machine does not have the device.
     """
     field, metadata = load_field(name)
     return Model(field, metadata, device=choose_device(device))

@@ -34,7 +34,9 @@ _MAPPED_BACK = 2048  # of a target's points
 class EncodedReference:
     """A reference, encoded, with its descriptors (paper, eq. 8), for any number of targets.
 
-    model: what encodes targets. encoded_cloud: the reference as the field sees it.
+    Attributes:
+        model: what encodes targets.
+        encoded_cloud: the reference as the field sees it.
     """
 
     def __init__(self, model: CloudEncoder, encoded_cloud: EncodedCloud) -> None:
@@ -76,24 +78,28 @@ class EncodedReference:
     ) -> dict[str, Match]:
         """Find regions on a target, which is encoded and mapped once for all of them.
 
-        regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
-        target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or encoded.
-        Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
-        method: "mask" maps the whole reference; each target point joins a region by the votes of
-        the mapped reference points nearest in position and normal (k-nearest voting). Parts of the
-        target that are far from all of them, by the error that the field expects, join a region
-        only where they grow out of it (`nrdf.regions.patches`). "points" snaps C's prediction of
-        each region point to the target (paper, eq. 9). A region of fewer than half of
-        `VOTING_NEIGHBOURS` points gets no majority anywhere: use "points" for spots.
-        refine: move the mapped reference onto the target in a few steps of smooth registration
-        (`nrdf.regions.refine`), about half a second a target.
-        drop_absent: a region that the target surely lacks, or that was not seen, comes back empty;
-        without it, as what was found for it all the same.
-        check: log a warning where the target does not look like an object of the category that
-        stands upright and faces forward (`check_kind`).
+        Args:
+            regions: name to boolean mask (n,), indices (m,) or points (m, 3) on the reference.
+            target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or encoded.
+                Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
+            method: "mask" maps the whole reference. Each target point joins a region by the
+                votes of the mapped reference points nearest in position and normal (k-nearest
+                voting). Parts of the target that are far from all of them, by the error that the
+                field expects, join a region only where they grow out of it
+                (`nrdf.regions.patches`). "points" snaps C's prediction of each region point to the
+                target (paper, eq. 9). A region of fewer than half of `VOTING_NEIGHBOURS` points
+                gets no majority anywhere: use "points" for spots.
+            refine: move the mapped reference onto the target in a few steps of smooth registration
+                (`nrdf.regions.refine`), about half a second a target.
+            drop_absent: a region that the target surely lacks, or that was not seen, comes back
+                empty; without it, as what was found for it all the same.
+            check: log a warning where the target does not look like an object of the category that
+                stands upright and faces forward (`check_kind`).
 
-        Raises RegionError for a region that is empty or not on the reference (the message names
-        it) or an unknown method, and CloudError for a target as `CloudEncoder.encode` does.
+        Raises:
+            RegionError: a region is empty or not on the reference (the message names it), or the
+                method is unknown.
+            CloudError: the target cannot be used, as `CloudEncoder.encode` says.
         """
         if method not in METHODS:
             raise RegionError(unknown_name("method", method, METHODS))

@@ -38,8 +38,16 @@ def write_job(
 ) -> None:
     """Write a transfer's result as the folder that `nrdf transfer` writes.
 
-    title: name of the target in the report. The folder appears whole or not at all. Raises
-    OutputError if it is not empty, without `overwrite`, or cannot be written.
+    The folder appears whole or not at all.
+
+    Args:
+        path: the folder.
+        result: what `ProcessTransfer.transfer` gave.
+        title: name of the target in the report.
+        overwrite: replace what an earlier result wrote there.
+
+    Raises:
+        OutputError: the folder is not empty, without `overwrite`, or cannot be written.
     """
     with output_folder(path, overwrite) as folder:
         write_job_files(folder, result, Limits(), title, {})

@@ -114,14 +114,21 @@ def align(
 ) -> AlignedScan:
     """Clean a scan of one object in any pose, and align it with the model's category.
 
-    scan: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh; so examples.
-    up: "x" to "-z", "x y z" or "auto" (the floor's, or else searched). sensors: (s, 3) where they
-    stood, instead of what the file says. unit: instead of the file's. skip: steps of cleaning to
-    leave out (`nrdf.scans.clean.STEPS`). examples: canonical in orientation, instead of members of
-    the category's family. For many scans, make one `PoseScorer` and use `clean_and_align`.
+    For many scans, make one `PoseScorer` and use `clean_and_align`.
 
-    Raises CloudError for a direction or step that is not known and where no object is left,
-    ModelError for a category without a family and no examples.
+    Args:
+        model: the category's model, as `nrdf.load_model` gives it.
+        scan: what `nrdf.as_cloud` takes: a PointCloud, a path, an array (n, 3), a mesh.
+        up: direction in the scan that points up: "x" to "-z", "x y z", or "auto" (the floor's,
+            or else searched).
+        sensors: (s, 3) where they stood, instead of what the file says.
+        unit: instead of the file's.
+        skip: steps of cleaning to leave out (`nrdf.scans.clean.STEPS`).
+        examples: objects in canonical orientation, instead of members of the category's family.
+
+    Raises:
+        CloudError: a direction or step is not known, or no object is left.
+        ModelError: the category has no family, and there are no examples.
     """
     direction = None if up == "auto" else up_axis(up)
     scan = as_cloud(scan, "the scan")
