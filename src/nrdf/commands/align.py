@@ -64,8 +64,8 @@ def align(
         reference: Examples of the category, +X forward and +Y up, to align by instead of members of
             its parametric family; needed for a category that has none.
         device: cpu, cuda, cuda:N or auto.
-        strict: End with 3 where there is any doubt: an ambiguous pose, a poor fit, several objects,
-            an unlikely unit.
+        strict: End with 3 where there is any warning: an ambiguous pose, a poor fit, several
+            objects, an unlikely unit.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.io.output import output_folder
@@ -102,12 +102,12 @@ def pose_panels(found: AlignedScan) -> list[Panel]:
     """The object in each likely pose, as the category's frame has it."""
     from nrdf.viz.picture import Panel
 
-    seen, panels = found.encode(), []
+    encoded, panels = found.encode(), []
     for candidate in found.alignment.likely[:MOST_POSES]:
         turn = found.alignment.best.pose.rotation.T @ candidate.pose.rotation
-        points = candidate.pose.to_canonical(seen.original(seen.points))
+        points = candidate.pose.to_canonical(encoded.original(encoded.points))
         title = f"probability {candidate.probability:.2f}"
-        panels.append(Panel(title, points, seen.normals @ turn, note="+X forward, +Y up"))
+        panels.append(Panel(title, points, encoded.normals @ turn, note="+X forward, +Y up"))
     return panels
 
 

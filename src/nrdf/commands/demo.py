@@ -45,8 +45,8 @@ def demo(
     The paper's demonstration (Fig. 6): five regions are taught on one chair, each with a strategy
     of its own; they are found on four others, where tool paths are planned, measured and written
     for a robot. The first is a real chair, scanned in an unknown pose by eight simulated cameras:
-    its scan is cleaned and aligned, its tool paths are measured against its true mesh, and driven
-    on an arm in simulation. The others are members of the parametric family that no training set
+    its scan is cleaned and aligned, its tool paths are measured against its true mesh, and run
+    on a simulated arm. The others are members of the parametric family that no training set
     holds, so their true regions are known exactly; the table shows found against true.
 
     Example: nrdf demo --out demo --overwrite
@@ -130,32 +130,32 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     with progress_bar("chairs") as progress:
         every = (REAL, *TARGETS)
         progress(0, len(every) + 1)
-        teacher = ProcessTransfer(_write_lesson(folder), loaded)
-        panels = [_taught_panel(REFERENCE, teacher)]
+        process_transfer = ProcessTransfer(_write_knowledge(folder), loaded)
+        panels = [_reference_panel(REFERENCE, process_transfer)]
         results: list[Found] = []
         for done, chair in enumerate(every, 1):
             progress(done, len(every) + 1)
             truth: dict[str, np.ndarray] = {}
             if chair == REAL:
-                transferred = _from_scan(folder, teacher)
+                result = _from_scan(folder, process_transfer)
             else:
                 target, truth = bundled_chair(chair)
                 nrdf.write_cloud(folder / f"{chair}.ply", target)
-                transferred = teacher.transfer(target)
-            found = _compare(chair, transferred, truth)
+                result = process_transfer.transfer(target)
+            found = _compare(chair, result, truth)
             results += found
-            panels.append(panel_of(transferred, chair, _note(found, transferred)))
+            panels.append(panel_of(result, chair, _note(found, result)))
             (folder / chair).mkdir()
-            write_job_files(folder / chair, transferred, Limits(), chair, origin)
-            export_job(job_of(transferred), EXPORTED, folder / chair / "export")
+            write_job_files(folder / chair, result, Limits(), chair, origin)
+            export_job(job_of(result), EXPORTED, folder / chair / "export")
         progress(len(every) + 1, len(every) + 1)
     draw_regions(panels, folder / "picture.png")
     write_report(folder, {**origin, "unit": "m", "found": [vars(row) for row in results]})
     return results
 
 
-def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
-    """The real chair: scanned, aligned, and worked; its figures are of its true mesh."""
+def _from_scan(folder: Path, process_transfer: ProcessTransfer) -> TransferResult:
+    """The real chair: scanned, aligned, and worked; measured against its true mesh."""
     from dataclasses import replace
 
     import numpy as np
@@ -176,11 +176,11 @@ def _from_scan(folder: Path, teacher: ProcessTransfer) -> TransferResult:
     rng = np.random.default_rng(0)
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
-    aligned = clean_and_align(PoseScorer(teacher.model), scan.cloud)
-    seen = aligned.encode_in_metres("m")
+    aligned = clean_and_align(PoseScorer(process_transfer.model), scan.cloud)
+    encoded = aligned.encode_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
-    seen = replace(seen, cloud=replace(seen.cloud, mesh=true))
-    return teacher.transfer(seen, target_warnings=aligned.warnings, kind=aligned.kind)
+    encoded = replace(encoded, cloud=replace(encoded.cloud, mesh=true))
+    return process_transfer.transfer(encoded, target_warnings=aligned.warnings, kind=aligned.kind)
 
 
 def _simulate(folder: Path) -> dict[str, Any] | None:
@@ -211,7 +211,7 @@ def _simulate(folder: Path) -> dict[str, Any] | None:
         return write_simulation(job / "simulation", done, REAL, origin, progress=progress)
 
 
-def _write_lesson(folder: Path) -> Any:
+def _write_knowledge(folder: Path) -> Any:
     """The bundled knowledge with its reference and regions as files that a user may change."""
     from nrdf.bundled import KNOWLEDGE, REFERENCE
     from nrdf.io.cloud import write_cloud
@@ -219,37 +219,37 @@ def _write_lesson(folder: Path) -> Any:
     from nrdf.process.knowledge import Reference
     from nrdf.process.knowledge_file import write_knowledge
 
-    lesson = read_bound_knowledge(KNOWLEDGE)
-    write_cloud(folder / f"{REFERENCE}.ply", lesson.cloud)
+    bound = read_bound_knowledge(KNOWLEDGE)
+    write_cloud(folder / f"{REFERENCE}.ply", bound.cloud)
     (folder / REFERENCE).mkdir()
     regions = []
-    for region in lesson.knowledge.regions:
+    for region in bound.knowledge.regions:
         file = f"{REFERENCE}/{region.name}.ply"
-        write_cloud(folder / file, lesson.cloud.select(lesson.regions[region.name]))
+        write_cloud(folder / file, bound.cloud.select(bound.regions[region.name]))
         regions.append(region.model_copy(update={"file": file}))
     cloud = f"{REFERENCE}.ply"
     reference = Reference(cloud=cloud, sha256=checksum(folder / cloud))
     changes = {"reference": reference, "regions": regions}
-    write_knowledge(folder / "chair.yaml", lesson.knowledge.model_copy(update=changes))
-    return lesson
+    write_knowledge(folder / "chair.yaml", bound.knowledge.model_copy(update=changes))
+    return bound
 
 
-def _taught_panel(title: str, teacher: ProcessTransfer) -> Panel:
+def _reference_panel(title: str, process_transfer: ProcessTransfer) -> Panel:
     """The reference with its regions, and what each process does there."""
     from nrdf.viz.picture import Panel
 
     lines: dict[str, list[np.ndarray]] = {}
-    for region, number, _ in teacher.steps():
-        lines.setdefault(region, []).extend(teacher.reference_contacts(region, number))
-    lesson = teacher.bound_knowledge
-    note = f"{len(lesson.regions)} regions, each with a process of its own, taught"
-    return Panel(title, lesson.cloud.points, None, lesson.regions, note, lines)
+    for region, number, _ in process_transfer.steps():
+        lines.setdefault(region, []).extend(process_transfer.reference_contacts(region, number))
+    bound = process_transfer.bound_knowledge
+    note = f"{len(bound.regions)} regions, each with a process of its own"
+    return Panel(title, bound.cloud.points, None, bound.regions, note, lines)
 
 
-def _compare(chair: str, transferred: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:
+def _compare(chair: str, result: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:
     rows = []
-    for step in transferred.paths:
-        match, metrics = transferred.regions[step.region].match, step.metrics
+    for step in result.paths:
+        match, metrics = result.regions[step.region].match, step.metrics
         true = truth.get(step.region)
         off = None if metrics is None or truth else metrics.true_distance_99_m
         rows.append(
@@ -269,11 +269,11 @@ def _compare(chair: str, transferred: TransferResult, truth: dict[str, np.ndarra
     return rows
 
 
-def _note(found: list[Found], transferred: TransferResult) -> str:
+def _note(found: list[Found], result: TransferResult) -> str:
     known = [row.iou for row in found if row.iou is not None]
     what = f"mean IoU {sum(known) / len(known):.2f}" if known else "a real chair, scanned"
     minutes = sum(row.cycle_time_s or 0.0 for row in found) / 60
-    seconds = sum(transferred.seconds.values())
+    seconds = sum(result.seconds.values())
     return f"{what} · {minutes:.0f} min of tool paths in {seconds:.1f} s"
 
 

@@ -80,7 +80,7 @@ def retrieve(
         target: Cloud or mesh of the object to find them on, in the same frame, or in any with --up;
             any unit.
         out: Folder to write; regions-NAME, by the target's name, unless given.
-        method: mask: each target point asks the mapped reference points nearest to it;
+        method: mask: k-nearest voting: the mapped reference points nearest to each target point;
             points: each region point's prediction is snapped to the target (the paper's).
         refine: Move the mapped reference onto the target in a few steps first, about half a second
             more.
@@ -91,15 +91,15 @@ def retrieve(
         skip: Steps of cleaning the scan to leave out.
         topic: What to read of a ROS 2 bag that has clouds under several topics.
         device: cpu, cuda, cuda:N or auto.
-        strict: End with 3 where there is any doubt about the target: its kind, how it stands, a
-            scan's pose.
+        strict: End with 3 where there is any warning about the target: its kind, how it stands,
+            a scan's pose.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.io.output import output_folder
 
     out = out or Path(f"regions-{target.stem}")
     options = ScanOptions(up, sensor, unit, skip, topic)
-    doubts: list[str] = []
+    warnings: list[str] = []
     with output_folder(out, overwrite, [reference, *region, target, model]) as folder:
         clock = Clock()
         import nrdf
@@ -117,7 +117,7 @@ def retrieve(
             examples = alignment_examples(loaded, reference_cloud)
             scan = read_scan(loaded, target, options, examples)
             warn_of_scan(scan, target)
-            target_cloud, doubts = scan.scan, scan.warnings
+            target_cloud, warnings = scan.scan, scan.warnings
         regions = read_regions(region, reference_cloud.unit)
         clock.lap("read files")
         encoded = loaded.set_reference(reference_cloud)
@@ -125,8 +125,8 @@ def retrieve(
         encoded_target = loaded.encode(target_cloud) if scan is None else scan.encode()
         kind = encoded.check_kind(encoded_target) if scan is None else scan.kind
         if scan is None:
-            doubts = list(kind.warnings)
-            warn_of(doubts, target)
+            warnings = list(kind.warnings)
+            warn_of(warnings, target)
         matches = encoded.retrieve_all(regions, encoded_target, method, refine, check=False)
         clock.lap("target and regions")
         title = f"{reference.name} (reference)"
@@ -158,7 +158,7 @@ def retrieve(
     console.print(f"{clock.total:.1f} s; results, report and picture in {out}")
     if not any(len(match.indices) for match in matches.values()):
         raise NothingFoundError(_nothing_found(target, up))
-    return 3 if strict and doubts else 0
+    return 3 if strict and warnings else 0
 
 
 class Clock:

@@ -66,16 +66,16 @@ def alignment_examples(model: Model, reference: PointCloud) -> list[PointCloud]:
 
 
 def warn_of_scan(found: AlignedScan, path: Path) -> None:
-    """Log every doubt about a scan as a warning, and a guess of its unit."""
+    """Log a scan's warnings, and a guess of its unit."""
     if found.unit.origin == "guessed":
         log.info("%s: the unit is guessed to be %s", path, found.unit.name)
     warn_of(found.warnings, path)
 
 
-def warn_of(doubts: Sequence[str], path: Path) -> None:
-    """Log doubts about a file as warnings."""
-    for doubt in doubts:
-        log.warning("%s: %s", path, doubt)
+def warn_of(warnings: Sequence[str], path: Path) -> None:
+    """Log warnings about a file."""
+    for warning in warnings:
+        log.warning("%s: %s", path, warning)
 
 
 def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 from nrdf.commands.console import command_line, console, errors, versions
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import File, Folder, Metavar
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Bounds
 
 
-@one_run_at("session")
+@lock_output("session")
 def studio(
     session: Folder = Path("studio"),
     host: str = "127.0.0.1",

@@ -31,7 +31,7 @@ def teach(
     paint
 
     Args:
-        reference: Cloud or mesh of the object that is taught: +X forward, +Y up. Needed.
+        reference: Cloud or mesh of the object that the regions are on: +X forward, +Y up. Needed.
         category: chair, car, plane, or what a model was trained on; of the latter give --model.
             Needed.
         out: File to write; CATEGORY.yaml unless given.

@@ -1,4 +1,4 @@
-"""`nrdf transfer`: process knowledge, taken from the object it was taught on to new ones."""
+"""`nrdf transfer`: process knowledge, transferred from its reference to new objects."""
 
 from __future__ import annotations
 

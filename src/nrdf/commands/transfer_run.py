@@ -83,7 +83,7 @@ class TransferRun:
             from nrdf.reports.job_folder import write_job_files
 
             check_inputs(out, files_of(self.bound.knowledge, self.knowledge_file.parent))
-            result, scan = self._transferred(target)
+            result, scan = self._transfer_to(target)
             origin = {
                 "command": command_line(),
                 "knowledge": str(self.knowledge_file),
@@ -99,7 +99,7 @@ class TransferRun:
         console.print(f"{_summary(report)}; all in {out}")
         self._check(report)
 
-    def _transferred(self, target: Path) -> tuple[TransferResult, AlignedScan | None]:
+    def _transfer_to(self, target: Path) -> tuple[TransferResult, AlignedScan | None]:
         """The transfer to one target, and the scan that the target is, if it is one."""
         import nrdf
         from nrdf.process.bound_knowledge import unit_and_warnings
@@ -134,12 +134,12 @@ class TransferRun:
 
         if not report["total"]["paths"]:
             raise NothingFoundError(_nothing_planned(report, self.category, self.scan.up))
-        not_met, doubted = (
+        not_met, doubtful = (
             report["limits"]["not_met"],
             report["strict_warnings"] if self.strict else [],
         )
-        if not_met or doubted:
-            parts = (("limits not met", not_met), ("doubtful, with --strict", doubted))
+        if not_met or doubtful:
+            parts = (("limits not met", not_met), ("doubtful, with --strict", doubtful))
             lines = [line for title, of in parts if of for line in (f"{title}:", *_indented(of))]
             raise LimitError("\n".join(lines))
 
@@ -188,7 +188,7 @@ def _marked(files: tuple[Path, ...], unit: str) -> dict[str, Any]:
 
 
 def _scan_unit(scan: AlignedScan, target: Path) -> tuple[str, list[str]]:
-    """The scan's unit, and what is doubtful about it beyond the scan's own doubts.
+    """The scan's unit, and warnings about it beyond the scan's own.
 
     Raises ProcessError unless it is given or only one is plausible.
     """

@@ -5,11 +5,11 @@ from __future__ import annotations
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, errors, show, table, versions
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import File, Folder
+from nrdf.commands.output_lock import lock_output
 
 
-@one_run_at("out")
+@lock_output("out")
 def arm(demo: Positional[Folder], out: File | None = None) -> None:
     """Simulate the demonstration's chairs on the bundled arm, against the bars of
     docs/evidence/robot.md.

@@ -15,8 +15,8 @@ from nrdf.commands.console import (
     table,
     versions,
 )
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import Folder
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from nrdf_benchmark.bsrc.evaluate import MethodResult
 
 
-@one_run_at("out")
+@lock_output("out")
 def bsrc(
     data: Folder,
     category: Literal["chair", "car", "plane"],

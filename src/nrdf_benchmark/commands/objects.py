@@ -14,12 +14,12 @@ from nrdf.commands.console import (
     table,
     versions,
 )
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import Folder
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Bounds, Count, NonNegativeCount
 
 
-@one_run_at("out")
+@lock_output("out")
 def objects(
     data: Folder,
     out: Folder | None = None,

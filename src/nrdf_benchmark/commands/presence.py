@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from nrdf.commands.console import console, progress_bar, show, table
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import Folder
+from nrdf.commands.output_lock import lock_output
 
 if TYPE_CHECKING:
     from nrdf.scans.pose_scorer import PoseScorer
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from nrdf_benchmark.presence import Example
 
 
-@one_run_at("out")
+@lock_output("out")
 def presence(
     out: Folder,
     objects: Folder | None = None,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import File, Folder
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count, NonNegativeCount
 
 
-@one_run_at("out")
+@lock_output("out")
 def scans(
     category: Literal["chair", "car", "plane"],
     model: str | None = None,

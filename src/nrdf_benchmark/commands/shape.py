@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from nrdf.commands.console import command_line, console, progress_bars, versions
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import Folder
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Bounds, Count, Fraction
 
 
-@one_run_at("out")
+@lock_output("out")
 def shape(
     data: Folder,
     method: tuple[str, ...] = ("nrdf",),

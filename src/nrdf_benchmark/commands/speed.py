@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nrdf.commands.console import console, errors, show, table, versions
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import File
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count, NonNegativeCount
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from nrdf_benchmark.speed.transfer import TransferSpeed
 
 
-@one_run_at("out")
+@lock_output("out")
 def speed(
     preset: tuple[str, ...] = ("default", "paper"),
     device: str = "cpu",

@@ -22,4 +22,4 @@ def test_what_is_asked_is_passed_on_and_mistakes_are_told(monkeypatch, capsys):
     others, words_out = (Path("b"), Path("c")), ("stool", "bench")
     assert asked == [("chair", (Path("a"),), others, Path("runs/chair-kind"), words_out, 9, False)]
     said = " ".join(capsys.readouterr().out.split())
-    assert "2.0% are doubted wrongly, 3.1% pass wrongly" in said
+    assert "2.0% are refused wrongly, 3.1% pass wrongly" in said

@@ -7,12 +7,12 @@ import os
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, progress_bar
-from nrdf.commands.one_run import one_run_at
 from nrdf.commands.options import Folder
+from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count
 
 
-@one_run_at("data")
+@lock_output("data")
 def correspond(
     data: Positional[tuple[Folder, ...]],
     templates: Count = 12,

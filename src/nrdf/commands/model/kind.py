@@ -52,6 +52,6 @@ def kind(
         )
     scores = read_metadata(weights)["scores"]
     console.print(
-        f"wrote {weights}; of clouds of other shapes, {scores['members-refused']:.1%} are doubted "
+        f"wrote {weights}; of clouds of other shapes, {scores['members-refused']:.1%} are refused "
         f"wrongly, {scores['others-passed']:.1%} pass wrongly"
     )

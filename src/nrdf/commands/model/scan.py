@@ -86,8 +86,8 @@ def scan(
             pixels=pixels,
             floor=floor,
         )
-        seen = simulate_scan(*load_mesh(mesh), settings, rng, pose, unit)
-        cloud = replace(seen.cloud, normals=seen.normals) if normals else seen.cloud
+        scanned = simulate_scan(*load_mesh(mesh), settings, rng, pose, unit)
+        cloud = replace(scanned.cloud, normals=scanned.normals) if normals else scanned.cloud
         truth = {
             "command": command_line(),
             "mesh": str(mesh),
@@ -95,12 +95,12 @@ def scan(
             "yaw_degrees": float(np.degrees(turn)),
             "scale": scale,
             "T_scan_mesh": pose.T_scan_canonical,
-            "sensors": seen.cloud.sensors,
+            "sensors": scanned.cloud.sensors,
             "points": len(cloud),
-            "points_of_floor": int((seen.face < 0).sum()),
+            "points_of_floor": int((scanned.face < 0).sum()),
             "unit": unit,
         }
-        write_cloud(folder / out.name, cloud, scalars={"view": seen.view, "face": seen.face})
+        write_cloud(folder / out.name, cloud, scalars={"view": scanned.view, "face": scanned.face})
         write_json(folder / beside.name, truth)
     of_floor = f", {truth['points_of_floor']} of them of the floor" if floor else ""
     console.print(f"{len(cloud)} points{of_floor} in {out}; the truth in {beside}")

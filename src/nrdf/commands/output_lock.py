@@ -13,7 +13,7 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
-def one_run_at(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
+def lock_output(name: str) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
     """A decorator: the verb keeps other runs out of the place that its argument `name` gives.
 
     The argument may also give several places, or None. OutputError is raised at once, before
