@@ -25,8 +25,8 @@ ShareOption = Annotated[Fraction, Metavar("SHARE")]
 
 
 def transfer(
-    knowledge: Positional[File],
-    target: Positional[tuple[File, ...]],
+    knowledge: Positional[Annotated[Path, Metavar("KNOWLEDGE")]],
+    target: Positional[Annotated[tuple[Path, ...], Metavar("TARGET [TARGET ...]")]],
     out: Folder | None = None,
     model: str | None = None,
     unit: Unit | None = None,
