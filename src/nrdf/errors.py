@@ -1,4 +1,4 @@
-"""What can go wrong, each with a message that says what was wrong, what would be right, what to do.
+"""Errors. Each message says what is wrong, what would be right, and what to do.
 
 Every error that a user can cause derives from `NrdfError`; the command line prints its message
 without a traceback and ends with its `exit_code`.

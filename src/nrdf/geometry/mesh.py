@@ -1,7 +1,7 @@
-"""Triangle meshes as they are found: faces turned outwards, and the skin that is seen from outside.
+"""Triangle meshes: checking, cleaning, and the outer skin with faces turned outwards.
 
-Meshes from the wild have faces of either winding, faces given twice (once for each side), parts
-that overlap, and insides (cabins, double shells) that no sensor ever sees.
+Meshes in practice have faces of either winding, faces given twice (once for each side), parts that
+overlap, and insides (cabins, double shells) that no sensor ever sees.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ def visibility(
 def seen_from_both_sides(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Which `points` (n, 3) are seen from both sides, (n,) bool: none of a closed surface.
 
-    Of a surface with large holes that is most of what is not before something else, and which of
-    its sides was seen cannot be told. `normals` (n, 3), any sign.
+    On a surface with large holes these are most points, and nothing tells which of their sides a
+    sensor saw. `normals` (n, 3), any sign.
     """
     _, front, back = visibility(points, normals)
     less, more = np.minimum(front, back), np.maximum(front, back)

@@ -1,11 +1,10 @@
-"""Inside or outside of a shape: oriented points, or a mesh.
+"""Winding numbers of oriented points or of a mesh: 1 inside, 0 outside.
 
-libigl is not asked about what would end the process. Its octree of a cloud halves cells until each
-holds one point: of two equal points, or two that differ by less than a cell's centre can, it comes
-to no end, and the stack overflows. Its tree over a mesh reads memory that is not its own where
-there is no face, where a face names a vertex that is not there, and where single precision cannot
-hold the coordinates. So every shape is brought to unit size, and points are moved onto a lattice of
-which each place is taken once: 22 halvings tell any two of them apart.
+Some input would crash libigl, so it is changed or refused here. libigl's octree halves cells until
+each holds one point: two equal or nearly equal points overflow its stack. Its mesh tree reads
+invalid memory if there is no face, if a face names a vertex that does not exist, or if coordinates
+exceed single precision. So every shape is scaled to unit size, and points are rounded to a lattice
+and taken once each: 22 halvings separate any two of them.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def write_atomically(path: Path, parts: list[bytes | memoryview]) -> None:
 
     Raises OutputError if the folder is missing, not writable or full.
     """
-    # Named before it exists: whatever ends this process has it cleared away.
+    # The name is known before the file exists, so that an interrupt removes it too.
     temporary = path.parent / f".{path.name}.{secrets.token_hex(4)}.part"
     try:
         with open(temporary, "xb") as file:
@@ -62,7 +62,7 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def output_errors(path: str | Path) -> Iterator[None]:
-    """What prevents writing `path` inside of the block is raised as OutputError."""
+    """Raise errors of writing `path` within the block as OutputError."""
     try:
         yield
     except (OSError, sqlite3.Error) as error:

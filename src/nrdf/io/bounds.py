@@ -1,4 +1,4 @@
-"""What a number may be: one check for options, limits and settings, which NaN never passes."""
+"""Bounds of numbers: one check for options, limits and settings. NaN never passes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names that become names of files, on Linux, macOS and Windows alike."""
+"""Names that are safe for files on Linux, macOS and Windows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_NAME_BYTES = 200
 def file_name_problem(name: str) -> str:
     """Why `name`, with an ending, is no good name for a file; "" where it is one.
 
-    Separators are the caller's to look for, in what characters are allowed at all.
+    The caller checks for separators and for the characters that it allows.
     """
     size = len(name.encode("utf-8", "surrogatepass"))
     if size > MAX_NAME_BYTES:

@@ -1,7 +1,7 @@
-"""Opening files that somebody else names: regular files only, and never more than fits.
+"""Opening files that users name: regular files only, and only up to a size.
 
-A name from outside may be that of a pipe, on which a reader waits for ever, or of a device, which
-never ends. Every reader of user's files opens them here, or asks `require_file` first.
+A name may be that of a pipe, which a reader waits for without end, or of a device, which has no
+end. Every reader of users' files opens them here, or calls `require_file` first.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def open_file(path: str | Path, error: type[NrdfError]) -> BinaryIO:
     where it may not be read."""
     require_file(path, error)  # before opening: opening alone makes some devices act
     try:
-        file = open(path, "rb", opener=_at_once)  # noqa: SIM115 (the caller closes it)
+        file = open(path, "rb", opener=_without_waiting)  # noqa: SIM115 (the caller closes it)
     except OSError as problem:
         raise _unreadable(path, problem, error) from None
     try:
@@ -64,7 +64,7 @@ def read_file(path: str | Path, error: type[NrdfError], most: int) -> bytes:
     return content
 
 
-def _at_once(path: str, flags: int) -> int:
+def _without_waiting(path: str, flags: int) -> int:
     """Opens without waiting: another process may have put a pipe in the file's place by now."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 

@@ -1,9 +1,9 @@
-"""One run at a time writes to a place, and clears what a killed run left there.
+"""One run at a time writes to a file or folder, and removes what a killed run left there.
 
-Beside a file or folder NAME lies `.NAME.lock` as long as a run writes it. The operating system
-takes the lock from a process that ends in whatever way, so a run that is alive can be told from a
-dead one, whatever their process numbers. Beside it lie as well, until they are whole,
-`.NAME.TOKEN.part` (a file), `.NAME.TOKEN.tmp` and, for a moment, `.NAME.TOKEN.old` (folders).
+While a run writes NAME, the file `.NAME.lock` is beside it, locked. The operating system releases
+the lock when a process ends, however it ends, so a live run can be told from a dead one. Unfinished
+output is beside it too: `.NAME.TOKEN.part` (a file), `.NAME.TOKEN.tmp` and, for a moment,
+`.NAME.TOKEN.old` (folders).
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ _PART = re.compile(rf"\.(.+)\.{_TOKEN}\.part")
 
 @contextmanager
 def write_lock(path: str | Path, wait: bool = False) -> Iterator[None]:
-    """No other run writes to `path`, a file or folder or neither yet, until the block ends.
+    """Lock `path`, a file or folder that need not exist yet, against other runs' writing.
 
-    Makes the parents that are missing (those that are still empty at the end go again), and
-    removes what killed runs left of `path`. Where another run is writing there, raises OutputError
-    at once; with `wait`, waits for it. Raises OutputError too where the place cannot be written.
+    Missing parents are made, and removed again if they are empty at the end; what killed runs left
+    of `path` is removed. If another run is writing there, raises OutputError at once, or, with
+    `wait`, waits for it. Also raises OutputError if `path` cannot be written.
     """
     from filelock import FileLock, Timeout
 
     place = resolve_links(path)
-    file, made = hidden_path(place, "lock"), _missing(lock_folder(place))
+    file, made = hidden_path(place, "lock"), _missing_folders(lock_folder(place))
     lock = FileLock(file)
     try:
         with output_errors(path):
@@ -54,12 +54,12 @@ def write_lock(path: str | Path, wait: bool = False) -> Iterator[None]:
                     ) from None
                 log.info("waiting for another run, which is writing to %s", path)
                 lock.acquire()
-            _clear(place)
+            _remove_leftovers(place)
         yield
     finally:
         if lock.is_locked:
-            # Before it is given back: who opened it meanwhile sees that its name is gone, and
-            # begins anew. Windows removes no open file; there, releasing removes it.
+            # Removed before it is released: a run that has opened it meanwhile sees that it is
+            # gone, and starts again. Windows removes no open file; there, releasing does.
             with suppress(OSError):
                 os.unlink(file)
             lock.release()
@@ -78,10 +78,10 @@ def resolve_links(path: str | Path) -> Path:
 
 
 def lock_folder(place: Path) -> Path:
-    """The folder in which the lock of `place`, and what is not whole, lie.
+    """The folder for the lock and the unfinished output of `place`.
 
-    Its parent; itself for a folder that cannot be moved: a mount point, as containers have, or one
-    in a folder that is not ours to write.
+    Its parent; or `place` itself if it is a folder that cannot be renamed: a mount point, as
+    containers have, or one whose parent cannot be written.
     """
     parent = place.parent
     if place.is_dir() and (os.path.ismount(place) or not os.access(parent, os.W_OK | os.X_OK)):
@@ -90,24 +90,25 @@ def lock_folder(place: Path) -> Path:
 
 
 def hidden_path(place: Path, ending: str) -> Path:
-    """The name beside `place`, or in it, that ends in `ending`."""
+    """The path of the hidden file `.NAME.ending` that belongs to `place`."""
     return lock_folder(place) / f".{place.name}.{ending}"
 
 
 def random_token() -> str:
-    """What tells names of runs apart, alike in process number and time though they be."""
+    """Eight random hexadecimal digits, which make a run's names unique."""
     return secrets.token_hex(4)
 
 
 def leftover_folders(place: Path, ending: str) -> list[Path]:
-    """Folders `.NAME.TOKEN.ending` of `place`."""
+    """Hidden folders `.NAME.TOKEN.ending` of `place` that earlier runs left."""
     name = re.compile(rf"\.{re.escape(place.name)}\.{_TOKEN}\.{ending}")
-    return [path for path in _named(lock_folder(place), name) if stat.S_ISDIR(path.lstat().st_mode)]
+    return [
+        path for path in _matching(lock_folder(place), name) if stat.S_ISDIR(path.lstat().st_mode)
+    ]
 
 
-def _clear(place: Path) -> None:
-    """Remove what killed runs left of `place`, and files in it that are not whole. What was set
-    aside (`.old`) holds other people's files, and stays."""
+def _remove_leftovers(place: Path) -> None:
+    """Remove unfinished output of killed runs. Folders `.old` stay: they may hold foreign files."""
     for folder in leftover_folders(place, "tmp"):
         shutil.rmtree(folder, ignore_errors=True)
     remove_partial_files(lock_folder(place), place.name)
@@ -116,11 +117,11 @@ def _clear(place: Path) -> None:
 
 
 def remove_partial_files(folder: Path, name: str | None = None) -> None:
-    """Remove the files in `folder`, those of one `name` or all, that killed runs left half-written.
+    """Remove half-written files that killed runs left in `folder`, all or those of one `name`.
 
-    Those of a name that is locked may be another run's, and stay.
+    Files whose name is locked stay: another run may be writing them.
     """
-    for path in _named(folder, _PART):
+    for path in _matching(folder, _PART):
         found = _PART.fullmatch(path.name)
         of = found[1] if found else ""
         mine = of == name if name is not None else not (folder / f".{of}.lock").exists()
@@ -128,18 +129,18 @@ def remove_partial_files(folder: Path, name: str | None = None) -> None:
             path.unlink()
 
 
-def _named(folder: Path, name: re.Pattern[str]) -> list[Path]:
+def _matching(folder: Path, name: re.Pattern[str]) -> list[Path]:
     if not folder.is_dir():
         return []
     return sorted(path for path in folder.iterdir() if name.fullmatch(path.name))
 
 
-def _missing(folder: Path) -> list[Path]:
-    """What there is not of a folder and its parents, outermost first."""
+def _missing_folders(folder: Path) -> list[Path]:
+    """Those of a folder and its parents that do not exist, outermost first."""
     return [p for p in (folder, *folder.parents) if not p.exists()][::-1]
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    with suppress(OSError):  # somebody has put something there, or took it away
+    with suppress(OSError):  # another process has put something there, or removed it
         for folder in reversed(folders):
             folder.rmdir()

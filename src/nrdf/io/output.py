@@ -12,11 +12,9 @@ from pathlib import Path
 from nrdf.errors import OutputError
 from nrdf.io.atomic import output_errors
 from nrdf.io.locks import hidden_path, random_token, resolve_links, write_lock
-from nrdf.io.result_folder import REPORT, replace_folder, restore_folder, write_manifest
+from nrdf.io.result_folder import replace_folder, restore_folder, write_manifest
 
 log = logging.getLogger(__name__)
-
-__all__ = ["REPORT", "check_inputs", "output_file", "output_files", "output_folder"]
 
 
 @contextmanager
@@ -25,10 +23,10 @@ def output_folder(
 ) -> Iterator[Path]:
     """A temporary folder beside `path` to write into, moved to `path` when the block ends well.
 
-    Whatever ends the block early (an error, Ctrl-C), nothing stays behind, not even the parents
-    that had to be made; after `kill -9` the next run with the same `path` clears what stayed. With
-    `overwrite` an existing folder keeps what is not ours (`nrdf.io.result_folder`). `inputs`: files
-    and folders that are read, see `check_inputs`. A `path` that is a link is followed.
+    If the block ends early (an error, Ctrl-C), nothing stays behind, not even the parents that had
+    to be made; after `kill -9` the next run with the same `path` removes what stayed. With
+    `overwrite` an existing folder keeps its foreign files (`nrdf.io.result_folder`). `inputs`:
+    files and folders that are read, see `check_inputs`. A `path` that is a link is followed.
 
     Raises OutputError if `path` is a file, is a folder that is not empty (without `overwrite`),
     holds one of the inputs, is being written by another run, or cannot be written.

@@ -1,7 +1,6 @@
 """Reading and writing the Stanford PLY format: ASCII and binary of both byte orders.
 
-The header of a file is a stranger's claim: counts are checked against the file's size before any
-memory is set aside for them.
+A header may be wrong: counts are checked against the file's size before memory is taken for them.
 """
 
 from __future__ import annotations
@@ -219,7 +218,7 @@ def _read_rows(
 def _read_binary_row(file: BinaryIO, element: Element, order: str) -> dict[str, float]:
     values = {}
     for p in element.properties:
-        value = _take(file, order + (p.length_kind or p.kind))
+        value = _read_value(file, order + (p.length_kind or p.kind))
         if p.length_kind is None:
             values[p.name] = value
             continue
@@ -247,7 +246,7 @@ def _read_text_row(file: BinaryIO, element: Element, _: str) -> dict[str, float]
     return values
 
 
-def _take(file: BinaryIO, kind: str) -> float:
+def _read_value(file: BinaryIO, kind: str) -> float:
     raw = file.read(np.dtype(kind).itemsize)
     if len(raw) < np.dtype(kind).itemsize:
         raise EOFError("the file ends within a row")

@@ -1,8 +1,8 @@
-"""Putting a new result in the place of an earlier one, and keeping what nrdf did not write there.
+"""Replacing a result's folder by a new one without losing files that nrdf did not write.
 
-A result's folder holds MANIFEST, the list of its files with sizes and checksums. Only a regular
-file that is still exactly what an earlier result's list says is removed. Everything else stays, or
-is called NAME.kept where the new result has something of that name. Links are not followed.
+A result's folder holds MANIFEST, the list of its own files with sizes and checksums. A file is
+removed only if it is still exactly what that list says. All other files are foreign: they stay, or
+are renamed to NAME.kept where the new result has a file of that name. Links are not followed.
 """
 
 from __future__ import annotations
@@ -40,17 +40,18 @@ class _Entry(NamedTuple):
 def write_manifest(folder: Path) -> None:
     """Write the list of all files in `folder`. Raises OutputError."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    _write(folder, {_entry(path, path.relative_to(folder).as_posix()) for path in files})
+    _write_manifest(
+        folder, {_file_entry(path, path.relative_to(folder).as_posix()) for path in files}
+    )
 
 
 def replace_folder(place: Path, new: Path, token: str) -> None:
-    """Make the whole folder `new`, with its manifest, the folder `place`.
+    """Replace the folder `place` by the folder `new`, which has its manifest.
 
-    Beside each other: `place` becomes `.NAME.TOKEN.old`, `new` becomes `place`, and what nrdf did
-    not write moves over from the old one, of which nothing is left. At any moment there is the old
-    or the new result, or, between two calls, neither: `restore_folder` puts the old one back. A
-    folder that cannot be moved gets the files one by one, its report removed first and written
-    last.
+    `place` is renamed to `.NAME.TOKEN.old` and `new` to `place`; then foreign files move over and
+    the old folder is removed. At any moment the old or the new result is there, or, between the two
+    renamings, neither: `restore_folder` puts the old one back. Where `place` cannot be renamed, the
+    files are replaced one by one, the report removed first and written last.
     """
     if not os.path.lexists(place):
         os.rename(new, place)
@@ -58,33 +59,33 @@ def replace_folder(place: Path, new: Path, token: str) -> None:
     with suppress(OSError):
         os.chmod(new, stat.S_IMODE(place.stat().st_mode))
     old = hidden_path(place, f"{token}.old")
-    if lock_folder(place) == place or _holds_working_folder(place) or not _renamed(place, old):
-        _move_in(new, place)
+    if lock_folder(place) == place or _holds_current_folder(place) or not _try_rename(place, old):
+        _replace_file_by_file(new, place)
         return
     try:
         os.rename(new, place)
     except OSError:
         os.rename(old, place)
         raise
-    _keep(old, place)
+    _move_foreign(old, place)
 
 
 def restore_folder(place: Path) -> None:
-    """Finish what a run that was killed in `replace_folder` had begun; the caller holds the claim.
+    """Tidy up after a run that was killed in `replace_folder`; the caller holds the lock.
 
-    What it set aside comes back where there is nothing in its place; else other people's files in
-    it do. Raises OSError where that fails.
+    The old result comes back where no new one is there; else its foreign files move to the new
+    one. Raises OSError where that fails.
     """
     for old in leftover_folders(place, "old"):
         if os.path.lexists(place):
             log.info("%s: an earlier run was ended here; tidying up after it", place)
-            _keep(old, place)
+            _move_foreign(old, place)
         else:
             log.info("%s: an earlier run was ended here; the result before it is back", place)
             os.rename(old, place)
 
 
-def _renamed(place: Path, old: Path) -> bool:
+def _try_rename(place: Path, old: Path) -> bool:
     try:
         os.rename(place, old)
     except OSError:  # it is in use (Windows)
@@ -92,81 +93,81 @@ def _renamed(place: Path, old: Path) -> bool:
     return True
 
 
-def _holds_working_folder(place: Path) -> bool:
+def _holds_current_folder(place: Path) -> bool:
     """Whether a shell that started this process would be left in a folder that is gone."""
     with suppress(OSError):
         return Path(os.path.realpath(os.getcwd())).is_relative_to(place)
     return False
 
 
-def _keep(old: Path, place: Path) -> None:
-    """Move from `old` to `place` what is not ours, remove the rest and `old` itself."""
-    _keep_in(old, place, "", _read(old))
-    # At the very end: a run that goes on with this needs to know what is ours.
+def _move_foreign(old: Path, place: Path) -> None:
+    """Move foreign files from `old` to `place`, and remove the rest and `old` itself."""
+    _move_foreign_in(old, place, "", _read_manifest(old))
+    # Last: a run that goes on from here needs to know which files are our own.
     with suppress(FileNotFoundError):
         os.unlink(old / MANIFEST)
     os.rmdir(old)
 
 
-def _keep_in(old: Path, place: Path, below: str, entries: set[_Entry]) -> None:
-    """`_keep` for the folder `old`, which was called `below` (with a / at its end) in a result."""
-    # What keeps its name goes first: it may be what something else would be called.
+def _move_foreign_in(old: Path, place: Path, below: str, entries: set[_Entry]) -> None:
+    """`_move_foreign` for the folder `old`, which a result called `below`, with a / at its end."""
+    # Files that keep their name go first: another file may be renamed to it.
     for path in sorted(old.iterdir(), key=lambda p: (os.path.lexists(place / p.name), p.name)):
         name, there = f"{below}{path.name}", place / path.name
         if name == MANIFEST and _is_file(path):
             continue
-        if _is_folder(path) and (_is_folder(there) or _names_below(name, entries)):
-            kept = there if _is_folder(there) else _free(there)
-            _keep_in(path, kept, f"{name}/", entries)
+        if _is_folder(path) and (_is_folder(there) or _has_entries_below(name, entries)):
+            kept = there if _is_folder(there) else _unused_name(there)
+            _move_foreign_in(path, kept, f"{name}/", entries)
             os.rmdir(path)
-        elif _is_ours(path, name, entries):
+        elif _is_own(path, name, entries):
             os.unlink(path)
         else:
             place.mkdir(parents=True, exist_ok=True)
-            os.rename(path, _free(there))
+            os.rename(path, _unused_name(there))
 
 
-def _names_below(name: str, entries: set[_Entry]) -> bool:
+def _has_entries_below(name: str, entries: set[_Entry]) -> bool:
     return any(entry.name.startswith(f"{name}/") for entry in entries)
 
 
-def _move_in(new: Path, place: Path) -> None:
-    """Move the files of `new` into `place` one by one."""
-    earlier, entries = _read(place), _read(new)
-    # Whatever ends this, the next run knows all of it as ours.
-    _make_room(place, Path(MANIFEST), earlier)
-    _write(place, earlier | entries)
+def _replace_file_by_file(new: Path, place: Path) -> None:
+    """Replace the files in `place` by those of `new`, one by one."""
+    earlier, entries = _read_manifest(place), _read_manifest(new)
+    # If this is interrupted, the next run knows all of these files as our own.
+    _set_aside_foreign(place, Path(MANIFEST), earlier)
+    _write_manifest(place, earlier | entries)
     names = {entry.name for entry in entries}
     gone = sorted({entry.name for entry in earlier} - names)
     for name in [REPORT, *gone]:
-        _remove_ours(place, name, earlier)
+        _remove_own(place, name, earlier)
     if REPORT in names:
-        _make_room(place, Path(REPORT), earlier)
+        _set_aside_foreign(place, Path(REPORT), earlier)
     for folder in sorted(path for path in new.rglob("*") if path.is_dir()):
         _make_folder(place, folder.relative_to(new))
     for name in sorted(names, key=lambda name: (name == REPORT, name)):
-        _make_room(place, Path(name), earlier | entries)
+        _set_aside_foreign(place, Path(name), earlier | entries)
         os.replace(new / name, place / name)
     os.replace(new / MANIFEST, place / MANIFEST)
 
 
-def _remove_ours(place: Path, name: str, entries: set[_Entry]) -> None:
+def _remove_own(place: Path, name: str, entries: set[_Entry]) -> None:
     folders = [place / parent for parent in Path(name).parents][:-1]
     if all(_is_folder(folder) for folder in folders):
-        if _is_ours(place / name, name, entries):
+        if _is_own(place / name, name, entries):
             os.unlink(place / name)
         with suppress(OSError):  # they hold something else
             for folder in folders:
                 os.rmdir(folder)
 
 
-def _make_room(place: Path, name: Path, entries: set[_Entry]) -> None:
-    """Set aside what is not ours in the place of the file `name`, and make its folders."""
+def _set_aside_foreign(place: Path, name: Path, entries: set[_Entry]) -> None:
+    """Rename a foreign file that has the `name` of a new one, and make the new one's folders."""
     _make_folder(place, name.parent)
     path, said = place / name, name.as_posix()
-    ours = _is_file(path) if said == MANIFEST else _is_ours(path, said, entries)
+    ours = _is_file(path) if said == MANIFEST else _is_own(path, said, entries)
     if os.path.lexists(path) and not ours:
-        os.rename(path, _free(path))
+        os.rename(path, _unused_name(path))
 
 
 def _make_folder(place: Path, name: Path) -> None:
@@ -174,11 +175,11 @@ def _make_folder(place: Path, name: Path) -> None:
     for folder in [place / part for part in (name, *name.parents)][-2::-1]:
         if not _is_folder(folder):
             if os.path.lexists(folder):
-                os.rename(folder, _free(folder))
+                os.rename(folder, _unused_name(folder))
             os.mkdir(folder)
 
 
-def _free(path: Path) -> Path:
+def _unused_name(path: Path) -> Path:
     """`path`, or the first of NAME.kept, NAME.kept-2 and so on that is not taken."""
     if not os.path.lexists(path):
         return path
@@ -204,16 +205,16 @@ def _is_file(path: Path) -> bool:
     return False
 
 
-def _is_ours(path: Path, name: str, entries: set[_Entry]) -> bool:
+def _is_own(path: Path, name: str, entries: set[_Entry]) -> bool:
     """Whether a path is a regular file, as it was when a result was written."""
     with suppress(OSError):
         size = path.lstat().st_size
         alike = _is_file(path) and any(e.name == name and e.bytes == size for e in entries)
-        return alike and _entry(path, name) in entries
+        return alike and _file_entry(path, name) in entries
     return False
 
 
-def _entry(path: Path, name: str) -> _Entry:
+def _file_entry(path: Path, name: str) -> _Entry:
     digest = hashlib.sha256()
     with open(path, "rb") as file:
         while block := file.read(_CHUNK):
@@ -221,7 +222,7 @@ def _entry(path: Path, name: str) -> _Entry:
     return _Entry(name, path.stat().st_size, digest.hexdigest())
 
 
-def _read(folder: Path) -> set[_Entry]:
+def _read_manifest(folder: Path) -> set[_Entry]:
     """The files that a result's manifest lists; none where there is no manifest, or no good one."""
     path = folder / MANIFEST
     try:
@@ -235,7 +236,7 @@ def _read(folder: Path) -> set[_Entry]:
     return {e for e in inside if Path(e.name).as_posix() == e.name != "."}
 
 
-def _write(folder: Path, entries: set[_Entry]) -> None:
+def _write_manifest(folder: Path, entries: set[_Entry]) -> None:
     content = {"files": [entry._asdict() for entry in sorted(entries)]}
     text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
     write_atomically(folder / MANIFEST, [text.encode("utf-8", "surrogateescape")])

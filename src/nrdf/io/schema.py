@@ -1,4 +1,4 @@
-"""Files that people write by hand, as strict models: unknown keys are refused, faults explained."""
+"""Models of files that people write: unknown keys are refused, and every fault is explained."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """YAML and JSON that people write, as plain values: mappings, lists, text, numbers, true and false.
 
-A file may come from a stranger. Nothing in it runs or tags a type; its depth, its numbers and what
-its aliases amount to are bounded while it is read; a key that occurs twice is an error. YAML's
-traps are gone: 1e-3 is a number, while dates, 0x10 and 1:30 are text.
+A file may come from anybody. Nothing in it is run and no tag makes an object. Its depth, its
+numbers and the size of its aliases are limited while it is read. A key that occurs twice is an
+error. Values are read as people mean them: 1e-3 is a number; dates, 0x10 and 1:30 are text.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""NumPy's files, NPY and NPZ: what an array is, is known and checked before it is loaded."""
+"""NumPy's files, NPY and NPZ: shape and type of an array are checked before it is loaded."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from nrdf.io.formats.tables import table_cloud
 from nrdf.io.rows import MAX_POINTS
 
 Head = tuple[tuple[int, ...], np.dtype]
-_LONGEST_WORD = 1024  # bytes of a unit or frame
-_MOST_SENSORS = 100_000
+_MAX_WORD = 1024  # bytes of a unit or frame
+_MAX_SENSORS = 100_000
 
 
 def read_npy(path: Path, _: int) -> RawCloud:
@@ -55,7 +55,7 @@ def read_npz(path: Path, _: int) -> RawCloud:
         for name in ("unit", "frame"):
             if f"{prefix}{name}" in arrays.names:
                 shape, kind = arrays.head(f"{prefix}{name}")
-                if shape != () or kind.kind != "U" or kind.itemsize > _LONGEST_WORD:
+                if shape != () or kind.kind != "U" or kind.itemsize > _MAX_WORD:
                     raise ValueError(f"'{name}' must be a word, not {shape} of {kind}")
                 setattr(cloud, name, str(arrays.load(f"{prefix}{name}")))
         if cloud.unit and parse_unit(cloud.unit) is None:
@@ -79,7 +79,7 @@ def _check_part(name: str, shape: tuple[int, ...], kind: np.dtype, count: int) -
     wanted = {"intensity": "(n,)", "sensors": "(s, 3)"}.get(name, "(n, 3)")
     fits = {
         "intensity": shape == (count,),
-        "sensors": len(shape) == 2 and shape[1] == 3 and shape[0] <= _MOST_SENSORS,
+        "sensors": len(shape) == 2 and shape[1] == 3 and shape[0] <= _MAX_SENSORS,
         "normals": shape == (count, 3),
     }.get(name, shape in ((count, 3), (count, 4)))
     if not fits or kind.kind not in "fiu":
@@ -108,7 +108,7 @@ def array_head(file: BinaryIO, size: int) -> Head:
         (1, 0): np.lib.format.read_array_header_1_0,
         (2, 0): np.lib.format.read_array_header_2_0,
     }
-    with _strangers():
+    with _library_errors():
         version = np.lib.format.read_magic(file)
         if version not in readers:
             raise ValueError(f"version {version} of the format, or records; plain numbers are read")
@@ -127,7 +127,7 @@ class Arrays:
     """
 
     def __init__(self, file: BinaryIO) -> None:
-        with _strangers():
+        with _library_errors():
             self._archive = zipfile.ZipFile(file)
         self._members = {
             info.filename.removesuffix(".npy"): info
@@ -144,7 +144,7 @@ class Arrays:
     def head(self, name: str) -> Head:
         """Shape and type of an array."""
         info = self._members[name]
-        with _strangers(), self._archive.open(info) as file:
+        with _library_errors(), self._archive.open(info) as file:
             return array_head(cast(BinaryIO, file), info.file_size)
 
     def load(self, name: str) -> np.ndarray:
@@ -156,7 +156,7 @@ class Arrays:
                 f"its arrays unpack to more than {MAX_UNPACKED_BYTES / 1e9:g} GB; thin the "
                 "cloud, or write it as PLY"
             )
-        with _strangers(), self._archive.open(self._members[name]) as file:
+        with _library_errors(), self._archive.open(self._members[name]) as file:
             return np.lib.format.read_array(file, allow_pickle=False)
 
 
@@ -174,8 +174,8 @@ def open_arrays(path: Path, error: type[NrdfError]) -> Iterator[Arrays]:
 
 
 @contextmanager
-def _strangers() -> Iterator[None]:
-    """ValueError for whatever zipfile lets through of its decompressors and NumPy of its parser."""
+def _library_errors() -> Iterator[None]:
+    """Raise whatever zipfile, its decompressors and NumPy raise as ValueError."""
     try:
         yield
     except ValueError:

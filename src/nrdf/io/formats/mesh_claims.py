@@ -1,7 +1,7 @@
-"""What a mesh file claims to hold, before its parser takes memory for it.
+"""Checks the sizes that a mesh file claims before its parser takes memory for them.
 
-Parsers of meshes believe counts: of elements in PLY and OFF, of accessors and instances in glTF,
-of members in 3MF. Each claim is held against the file's size, and against what is read at most.
+Parsers trust counts: of elements in PLY and OFF, of accessors and instances in glTF, of members in
+3MF. Here each count is compared with the file's size and with the most that is read.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def check_claimed_sizes(path: Path, file: BinaryIO) -> None:
             raise ValueError(f"{size / 1e6:.0f} MB; at most {_MOST_DESCRIPTION / 1e6:.0f} are read")
         if ending == ".gltf":
             tree = json.load(file)
-            outside = _around(path, tree)
+            outside = _bytes_beside(path, tree)
             faces = _check_gltf(tree, size + outside)
     if faces > MAX_FACES:
         raise ValueError(f"{faces} faces; at most {MAX_FACES} are used: simplify the mesh")
@@ -96,7 +96,7 @@ def _json_of_glb(file: BinaryIO) -> Any:
     return json.loads(file.read(length))
 
 
-def _around(path: Path, tree: Any) -> int:
+def _bytes_beside(path: Path, tree: Any) -> int:
     """Bytes of the files beside a .gltf that its buffers name."""
     names = [buffer.get("uri", "") for buffer in _items(tree, "buffers")]
     files = [path.parent / name for name in names if not str(name).startswith("data:")]

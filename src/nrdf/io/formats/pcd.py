@@ -11,12 +11,19 @@ import numpy as np
 
 from nrdf.errors import CloudError
 from nrdf.io.files import open_file
-from nrdf.io.formats.raw import MAX_UNPACKED_BYTES, USED, RawCloud, colours_of, intensity_of, stack
+from nrdf.io.formats.raw import (
+    MAX_UNPACKED_BYTES,
+    USED_COLUMNS,
+    RawCloud,
+    colours_of,
+    intensity_of,
+    stack,
+)
 from nrdf.io.rows import MAX_POINTS, binary_parts, count_rows, gather, text_parts
 
 _LONGEST_HEADER = 1 << 16
 _LONGEST_ROW = 1 << 16  # bytes
-_LZF_BEST = 90  # bytes that each packed one can give at most: three for 264
+_LZF_BEST = 90  # most bytes out for each byte in: three bytes give 264 at best
 _SIZES = {"F": ("4", "8"), "I": ("1", "2", "4", "8"), "U": ("1", "2", "4", "8")}
 
 
@@ -27,21 +34,21 @@ def read_pcd(path: Path, _: int) -> RawCloud:
     own frame is the usual one: the origin is also what writers put where they know nothing.
     """
     with open_file(path, CloudError) as file:
-        said = _read_header(path, file)
+        header = _read_header(path, file)
         try:
-            columns = _read_columns(file, said)
+            columns = _read_columns(file, header)
         except (KeyError, ValueError, IndexError, EOFError) as error:
             why = f"no {error} in its header" if isinstance(error, KeyError) else error
             raise CloudError(f"{path}: cannot read this PCD file: {why}") from error
     points = stack(columns, "xyz")
     if points is None:
         raise CloudError(
-            f"{path}: fields x, y and z are needed; it has {', '.join(said['FIELDS'])}"
+            f"{path}: fields x, y and z are needed; it has {', '.join(header['FIELDS'])}"
         )
     sensors: np.ndarray = np.empty((0, 3))
     try:
-        pose = np.array([float(word) for word in said.get("VIEWPOINT", [])])
-        grid = int(said.get("HEIGHT", ["1"])[0]) > 1
+        pose = np.array([float(word) for word in header.get("VIEWPOINT", [])])
+        grid = int(header.get("HEIGHT", ["1"])[0]) > 1
     except (ValueError, IndexError) as error:
         raise CloudError(f"{path}: damaged PCD header: {error}") from error
     if len(pose) == 7 and np.isfinite(pose).all() and (grid or pose[:3].any()):
@@ -57,15 +64,15 @@ def read_pcd(path: Path, _: int) -> RawCloud:
 
 
 def _read_header(path: Path, file: BinaryIO) -> dict[str, list[str]]:
-    said: dict[str, list[str]] = {}
-    while "DATA" not in said:
+    header: dict[str, list[str]] = {}
+    while "DATA" not in header:
         line = file.readline(4096)
         if not line or file.tell() > _LONGEST_HEADER:
             raise CloudError(f"{path}: damaged PCD header: no DATA line")
         words = line.decode("ascii", errors="replace").split("#")[0].split()
         if words:
-            said[words[0]] = words[1:]
-    return said
+            header[words[0]] = words[1:]
+    return header
 
 
 @dataclass(frozen=True)
@@ -80,14 +87,14 @@ class _Field:
     place: int
 
 
-def _read_columns(file: BinaryIO, said: dict[str, list[str]]) -> dict[str, np.ndarray]:
+def _read_columns(file: BinaryIO, header: dict[str, list[str]]) -> dict[str, np.ndarray]:
     """The first value of every field (n,) that a cloud has a use for, by name."""
-    count, fields = _count(said), _fields(said)
+    count, fields = _count(header), _fields(header)
     row = fields[-1].offset + fields[-1].repeat * fields[-1].kind.itemsize
     width = fields[-1].place + fields[-1].repeat
-    used = [field for field in fields if field.name in USED]
+    used = [field for field in fields if field.name in USED_COLUMNS]
     left = os.fstat(file.fileno()).st_size - file.tell()
-    data = said["DATA"][0]
+    data = header["DATA"][0]
     if data == "ascii":
         return _read_text(file, used, count, width, left)
     if data == "binary":
@@ -106,23 +113,23 @@ def _read_columns(file: BinaryIO, said: dict[str, list[str]]) -> dict[str, np.nd
     raise ValueError(f"DATA {data} is not known; known: ascii, binary, binary_compressed")
 
 
-def _count(said: dict[str, list[str]]) -> int:
-    count = int(said["POINTS"][0])
+def _count(header: dict[str, list[str]]) -> int:
+    count = int(header["POINTS"][0])
     if not 0 <= count <= MAX_POINTS:
         raise ValueError(f"{count} points; at most {MAX_POINTS} are read")
-    if "WIDTH" in said and "HEIGHT" in said:
-        width, height = int(said["WIDTH"][0]), int(said["HEIGHT"][0])
+    if "WIDTH" in header and "HEIGHT" in header:
+        width, height = int(header["WIDTH"][0]), int(header["HEIGHT"][0])
         if width * height != count:
             raise ValueError(f"WIDTH {width} times HEIGHT {height} is not POINTS {count}")
     return count
 
 
-def _fields(said: dict[str, list[str]]) -> list[_Field]:
+def _fields(header: dict[str, list[str]]) -> list[_Field]:
     fields: list[_Field] = []
     offset = place = 0
-    repeats = said.get("COUNT", ["1"] * len(said["FIELDS"]))
+    repeats = header.get("COUNT", ["1"] * len(header["FIELDS"]))
     for name, letter, size, count in zip(
-        said["FIELDS"], said["TYPE"], said["SIZE"], repeats, strict=True
+        header["FIELDS"], header["TYPE"], header["SIZE"], repeats, strict=True
     ):
         if letter not in _SIZES or size not in _SIZES[letter]:
             raise ValueError(f"field {name}: TYPE {letter} of SIZE {size} is not known")
@@ -133,7 +140,7 @@ def _fields(said: dict[str, list[str]]) -> list[_Field]:
         offset, place = offset + repeat * kind.itemsize, place + repeat
     if not fields or offset > _LONGEST_ROW:
         raise ValueError(f"a point of {offset} bytes; 1 to {_LONGEST_ROW} are read")
-    names = [field.name for field in fields if field.name in USED]
+    names = [field.name for field in fields if field.name in USED_COLUMNS]
     if len(set(names)) != len(names):
         raise ValueError("a field is named twice")
     return fields

@@ -11,7 +11,7 @@ from nrdf.errors import CloudError
 from nrdf.geometry.units import METRES, parse_unit
 from nrdf.io import ply
 from nrdf.io.formats import meshes
-from nrdf.io.formats.raw import USED, RawCloud, colours_of, intensity_of, stack
+from nrdf.io.formats.raw import USED_COLUMNS, RawCloud, colours_of, intensity_of, stack
 
 logger = logging.getLogger(__name__)
 
@@ -21,7 +21,7 @@ def read_ply(path: Path, mesh_samples: int) -> RawCloud:
     if header.count("face") and mesh_samples:
         cloud = meshes.read_mesh(path, mesh_samples)
     else:
-        columns = ply.read_scalars(path, header, wanted=USED)
+        columns = ply.read_scalars(path, header, wanted=USED_COLUMNS)
         points = stack(columns, "xyz")
         if points is None:
             has = [p.name for e in header.elements if e.name == "vertex" for p in e.properties]

@@ -1,4 +1,4 @@
-"""What a file holds, before anything is checked: what every reader gives."""
+"""What every reader gives: the content of a file, its values not yet checked."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from nrdf.geometry.mesh import Mesh
 MAX_UNPACKED_BYTES = 800_000_000
 """Bytes that a compressed file may unpack to; a small file can claim any number."""
 _INTENSITY = ("intensity", "scalar_Intensity", "scalar_intensity", "reflectance", "i")
-USED = {
+USED_COLUMNS = {
     *("x", "y", "z", "nx", "ny", "nz", "normal_x", "normal_y", "normal_z"),
     *("red", "green", "blue", "rgb", "rgba", *_INTENSITY),
 }
-"""Names of the columns that a cloud has a use for; no others need be held."""
+"""Names of the columns that a cloud uses; others are not read."""
 
 
 @dataclass
