@@ -24,7 +24,7 @@ from nrdf.io.cloud import PointCloud
 from nrdf.io.file_names import spreadsheet_text
 from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
-from nrdf.shapes.pool import CRASHED, each
+from nrdf.shapes.pool import CRASHED, run_tasks
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec
 from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 
@@ -193,7 +193,7 @@ def evaluate_shapes(
     tasks = [_Task(spec, path, category, settings) for spec in specs for path in paths]
     done: dict[tuple[str, Path], ShapeScore] = {}
     counts = dict.fromkeys((spec.name for spec in specs), 0)
-    with closing(each(_run, tasks, min(workers, len(tasks)))) as results:
+    with closing(run_tasks(_run, tasks, min(workers, len(tasks)))) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)

@@ -8,7 +8,7 @@ import trimesh
 
 from nrdf.errors import DataError, OutputError
 from nrdf.shapes import boxes as module
-from nrdf.shapes.boxes import Boxes, prepare_boxes, read_boxes, usable
+from nrdf.shapes.boxes import BoxUnion, is_usable_chair, prepare_boxes, read_boxes
 from nrdf.shapes.dataset import IndexRow, read_index, read_shape, shape_paths, write_index
 
 EPS = 1e-5
@@ -31,7 +31,7 @@ def inside(center, axes, size, points):
 
 @pytest.fixture(params=range(3))
 def solid(request):
-    return Boxes(*random_boxes(request.param))
+    return BoxUnion(*random_boxes(request.param))
 
 
 def test_occupancy_is_that_of_the_single_boxes(solid):
@@ -43,8 +43,8 @@ def test_occupancy_is_that_of_the_single_boxes(solid):
 
 def test_boxes_become_canonical():
     center, axes, size = random_boxes(0)
-    solid = Boxes(100 * center + 7, axes, 100 * size)
-    near = Boxes(center, axes, size)
+    solid = BoxUnion(100 * center + 7, axes, 100 * size)
+    near = BoxUnion(center, axes, size)
     np.testing.assert_allclose(solid.center, near.center, atol=1e-9)
     np.testing.assert_allclose(solid.half, near.half, atol=1e-9)
     corners = np.concatenate(
@@ -69,7 +69,7 @@ def test_the_surface_parts_inside_from_outside(solid):
 def test_what_another_box_covers_is_left_out():
     """A small box half sunk into a big one: half its sides and none of its base are seen."""
     big, small = np.array([2.0, 2, 2]), np.array([0.5, 1.0, 0.5])
-    solid = Boxes([[0, 0, 0], [0, 1, 0]], [np.eye(3)] * 2, [big, small])
+    solid = BoxUnion([[0, 0, 0], [0, 1, 0]], [np.eye(3)] * 2, [big, small])
     points, _ = solid.sample_surface(20_000, np.random.default_rng(0))
     top = solid.center[0, 1] + solid.half[0, 1]
     mast = (points[:, 1] > top + EPS).mean()
@@ -83,12 +83,12 @@ def test_only_chairs_with_slim_legs_are_usable():
     size = np.full((5, 3), 0.5)
     size[2:, 0] = 0.05
     label = np.array([0, 1, 2, 2, 2])
-    assert usable(size, label)
-    assert not usable(size, np.array([1, 1, 2, 2, 2]))  # no back
-    assert not usable(size, np.array([0, 0, 2, 2, 2]))  # no seat
-    assert not usable(size, np.array([0, 1, 2, 2, 3]))  # two legs
+    assert is_usable_chair(size, label)
+    assert not is_usable_chair(size, np.array([1, 1, 2, 2, 2]))  # no back
+    assert not is_usable_chair(size, np.array([0, 0, 2, 2, 2]))  # no seat
+    assert not is_usable_chair(size, np.array([0, 1, 2, 2, 3]))  # two legs
     size[4] = 0.5
-    assert not usable(size, label)  # a base in one box
+    assert not is_usable_chair(size, label)  # a base in one box
 
 
 def chair(rng):
@@ -138,7 +138,7 @@ def test_files_hold_what_the_boxes_say(file, tmp_path):
         assert (shape.category, shape.source) == ("chair", "boxes")
         index = int(row.name.removeprefix("boxes-"))
         start, end = boxes["offset"][index : index + 2]
-        solid = Boxes(*(boxes[key][start:end] for key in ("center", "axes", "size")))
+        solid = BoxUnion(*(boxes[key][start:end] for key in ("center", "axes", "size")))
         assert shape.surface_points.shape == (400, 3)
         np.testing.assert_array_equal(
             shape.query_occupancies, solid.occupancy(shape.query_points.astype(float))
@@ -209,6 +209,6 @@ def test_a_count_or_a_folder_that_cannot_be_is_refused(file, tmp_path):
 
 
 def test_a_box_within_a_box_has_no_surface():
-    hidden = Boxes([[0, 0, 0]] * 2, [np.eye(3)] * 2, [[1, 1, 1], [1.1, 1.1, 1.1]])
+    hidden = BoxUnion([[0, 0, 0]] * 2, [np.eye(3)] * 2, [[1, 1, 1], [1.1, 1.1, 1.1]])
     points, _ = hidden.sample_surface(500, np.random.default_rng(0))
     np.testing.assert_allclose(np.abs(points).max(axis=1), 0.5)

@@ -38,3 +38,14 @@ def test_odd_numbers_of_queries_are_kept_and_stay_near_the_cube():
     assert queries.shape == (101, 3) and queries.dtype == np.float16
     assert np.abs(queries[:50]).max() <= (1 + PADDING) / 2 + 1e-3
     assert np.abs(queries[50:]).max() < 0.3
+
+
+def test_queries_are_half_uniform_and_half_near():
+    surface = np.random.default_rng(0).normal(size=(300, 3))
+    surface *= 0.3 / np.linalg.norm(surface, axis=1, keepdims=True)
+    queries = occupancy_queries(surface, 2001, np.random.default_rng(1)).astype(float)
+    assert queries.shape == (2001, 3)
+    uniform, near = queries[:1000], queries[1000:]
+    assert np.abs(uniform).max() <= 0.5505 and np.abs(uniform).max(axis=0).min() > 0.54
+    distance = np.abs(np.linalg.norm(near, axis=1) - 0.3)
+    assert distance.mean() < 0.03 and np.median(distance) < 0.015 and distance.max() > 0.06

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nrdf.io.atomic import write_atomically
-from nrdf.shapes.pool import CRASHED, each
+from nrdf.shapes.pool import CRASHED, run_tasks
 
 
 def die_of_three(task):
@@ -21,7 +21,7 @@ def die_of_three(task):
 
 def test_a_process_that_dies_takes_only_its_own_task():
     before = os.environ.get("OMP_NUM_THREADS")
-    results = dict(each(die_of_three, [1, 2, 3, 4], workers=2))
+    results = dict(run_tasks(die_of_three, [1, 2, 3, 4], workers=2))
     assert str(results.pop(3)) == CRASHED
     assert str(results.pop(4)) == "four"
     assert results == {task: (task, "1") for task in (1, 2)}
@@ -29,13 +29,13 @@ def test_a_process_that_dies_takes_only_its_own_task():
 
 
 def test_one_worker_runs_in_this_process():
-    results = dict(each(lambda task: (task, os.getpid()), [1, 2], workers=1))
+    results = dict(run_tasks(lambda task: (task, os.getpid()), [1, 2], workers=1))
     assert results == {task: (task, os.getpid()) for task in (1, 2)}
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_nothing_to_do_is_done_at_once(workers):
-    assert list(each(die_of_three, [], workers)) == []
+    assert list(run_tasks(die_of_three, [], workers)) == []
 
 
 def write_slowly(path):
@@ -57,9 +57,9 @@ def test_ctrl_c_ends_all_processes_and_leaves_no_half_written_file(tmp_path):
         # Tests that run in a shell's background inherit that Ctrl-C is ignored.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from tests.shapes.test_pool import write_slowly\n"
-        "from nrdf.shapes.pool import each\n"
+        "from nrdf.shapes.pool import run_tasks\n"
         "if __name__ == '__main__':\n"
-        f"    print(list(each(write_slowly, [f'{tmp_path}/{{i}}' for i in range(40)], 2)))\n"
+        f"    print(list(run_tasks(write_slowly, [f'{tmp_path}/{{i}}' for i in range(40)], 2)))\n"
     )
     (tmp_path / "script.py").write_text(script)
     process = subprocess.Popen(
@@ -103,6 +103,6 @@ def die_of_a_large_task(task):
 def test_a_process_that_dies_while_large_tasks_wait_keeps_nobody_waiting():
     """More than a pipe holds is on its way to processes that are no more."""
     tasks = [(number, bytes(10_000_000)) for number in range(8)]
-    results = {task[0]: result for task, result in each(die_of_a_large_task, tasks, workers=2)}
+    results = {task[0]: result for task, result in run_tasks(die_of_a_large_task, tasks, workers=2)}
     assert str(results.pop(1)) == CRASHED
     assert results == {number: number for number in range(8) if number != 1}

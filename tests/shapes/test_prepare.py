@@ -7,9 +7,9 @@ import trimesh
 from builders.box_chair import chair, inside_chair
 from nrdf.errors import DataError, OutputError
 from nrdf.shapes.dataset import IndexRow, read_index, read_shape, write_index
-from nrdf.shapes.prepare import Settings, prepare_folder, prepare_mesh
+from nrdf.shapes.prepare import PrepareSettings, prepare_folder, prepare_mesh
 
-SMALL = Settings(surface_points=512, queries=1024)
+SMALL = PrepareSettings(surface_points=512, queries=1024)
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def meshes(tmp_path):
 
 
 def test_a_prepared_chair_is_canonical_and_true(meshes):
-    shape = prepare_mesh(meshes / "chair.obj", "chair", Settings())
+    shape = prepare_mesh(meshes / "chair.obj", "chair", PrepareSettings())
     assert shape.surface_points.shape == shape.surface_normals.shape == (8192, 3)
     assert shape.query_points.shape == (16384, 3)
     extent = np.ptp(shape.surface_points, axis=0)
@@ -38,7 +38,7 @@ def test_a_prepared_chair_is_canonical_and_true(meshes):
 
 
 def test_queries_are_half_uniform_and_half_near(meshes):
-    shape = prepare_mesh(meshes / "ball.ply", "ball", Settings(queries=4000))
+    shape = prepare_mesh(meshes / "ball.ply", "ball", PrepareSettings(queries=4000))
     radius = np.linalg.norm(shape.query_points.astype(float), axis=1)
     uniform, near = radius[:2000], radius[2000:]
     assert shape.query_occupancies[:2000].mean() == pytest.approx(0.5236 / 1.331, abs=0.04)
@@ -89,7 +89,7 @@ def test_a_second_run_keeps_what_is_there(meshes, tmp_path):
     assert (out / "chair.npz").stat().st_mtime_ns == before["chair.npz"][1]
     assert [p.name for p in out.glob(".*")] == [".new.npz.y.part"]
     assert len(read_index(out)) == 3
-    changed = Settings(surface_points=256, queries=1024)
+    changed = PrepareSettings(surface_points=256, queries=1024)
     assert len(prepare_folder(meshes, out, "chair", settings=changed).made) == 3
     assert len(prepare_folder(meshes, out, "chair", settings=changed, overwrite=True).made) == 3
 

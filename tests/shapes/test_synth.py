@@ -17,7 +17,6 @@ from nrdf.shapes.dataset import (
     write_index,
 )
 from nrdf.shapes.families import get_family
-from nrdf.shapes.occupancy import occupancy_queries
 from nrdf.shapes.synth import member_shape, synthesise
 
 EPS = 3e-5
@@ -142,17 +141,6 @@ def test_a_seed_fixes_a_shape():
     one, two = member_shape("table", 3), member_shape("table", 3)
     np.testing.assert_array_equal(one.surface_points, two.surface_points)
     np.testing.assert_array_equal(one.query_points, two.query_points)
-
-
-def test_queries_are_half_uniform_and_half_near():
-    surface = np.random.default_rng(0).normal(size=(300, 3))
-    surface *= 0.3 / np.linalg.norm(surface, axis=1, keepdims=True)
-    queries = occupancy_queries(surface, 2001, np.random.default_rng(1)).astype(float)
-    assert queries.shape == (2001, 3)
-    uniform, near = queries[:1000], queries[1000:]
-    assert np.abs(uniform).max() <= 0.5505 and np.abs(uniform).max(axis=0).min() > 0.54
-    distance = np.abs(np.linalg.norm(near, axis=1) - 0.3)
-    assert distance.mean() < 0.03 and np.median(distance) < 0.015 and distance.max() > 0.06
 
 
 def test_what_cannot_be_made_is_refused(tmp_path):

@@ -19,8 +19,8 @@ from nrdf.shapes.dataset import (
     IndexRow,
     Shape,
     add_to_index,
-    made_by,
-    make_folder,
+    make_data_folder,
+    settings_stamp,
     write_shape,
 )
 from nrdf.shapes.occupancy import occupancy_queries
@@ -32,7 +32,7 @@ _KEYS = ("center", "axes", "size", "label", "offset")
 _UNREADABLE = (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile)
 
 
-class Boxes:
+class BoxUnion:
     """A union of oriented boxes, canonical. center, size: (n, 3); axes: (n, 3, 3), unit rows."""
 
     def __init__(self, center: np.ndarray, axes: np.ndarray, size: np.ndarray) -> None:
@@ -83,7 +83,7 @@ class Boxes:
 
 
 def read_boxes(path: Path) -> dict[str, np.ndarray]:
-    """Arrays of a file of boxed objects. Raises DataError if it is none, saying why."""
+    """Arrays of a file of boxed objects. Raises DataError, with the reason, for any other file."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             missing = [key for key in _KEYS if key not in arrays]
@@ -107,7 +107,7 @@ def read_boxes(path: Path) -> dict[str, np.ndarray]:
     return boxes
 
 
-def usable(size: np.ndarray, label: np.ndarray) -> bool:
+def is_usable_chair(size: np.ndarray, label: np.ndarray) -> bool:
     """Whether boxes make a chair worth learning from: back, seat and at least three slim legs."""
     legs = size[label == LEG]
     return (
@@ -138,19 +138,21 @@ def prepare_boxes(
     boxes = read_boxes(path)
     offset = boxes["offset"]
     order = np.random.default_rng(seed).permutation(len(offset) - 1)
-    chosen = [i for i in order if usable(*_part(boxes, i, ("size", "label")))][:count]
+    chosen = [i for i in order if is_usable_chair(*_part(boxes, i, ("size", "label")))][:count]
     if not chosen:
         raise DataError(
             f"none of the {len(order)} objects in {path} is usable: each needs a back (label "
             f"{BACK}), a seat ({SEAT}) and three legs ({LEG}) thinner than {THICKEST_LEG}"
         )
-    make_folder(out)
+    make_data_folder(out)
     stamp = f"boxes/1 {SURFACE_POINTS} {QUERIES}"
     rows = []
     for done, index in enumerate(chosen, 1):
         name = f"boxes-{index:05d}"
-        if made_by(out / f"{name}.npz") != stamp:
-            shape = _shape(name, category, Boxes(*_part(boxes, index, ("center", "axes", "size"))))
+        if settings_stamp(out / f"{name}.npz") != stamp:
+            shape = _shape(
+                name, category, BoxUnion(*_part(boxes, index, ("center", "axes", "size")))
+            )
             write_shape(out / f"{name}.npz", shape, stamp)
         rows.append(IndexRow(name, "boxes", "train" if done % VALIDATION_EVERY else "val", licence))
         if progress is not None:
@@ -164,7 +166,7 @@ def _part(boxes: dict[str, np.ndarray], index: int, keys: tuple[str, ...]) -> li
     return [boxes[key][start:end] for key in keys]
 
 
-def _shape(name: str, category: str, boxes: Boxes) -> Shape:
+def _shape(name: str, category: str, boxes: BoxUnion) -> Shape:
     rng = np.random.default_rng(list(name.encode()))
     points, normals = boxes.sample_surface(SURFACE_POINTS, rng)
     queries = occupancy_queries(points, QUERIES, rng)

@@ -27,7 +27,7 @@ from nrdf.shapes.dataset import (
     shape_paths,
     write_shape,
 )
-from nrdf.shapes.pool import each
+from nrdf.shapes.pool import run_tasks
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 log = logging.getLogger(__name__)
@@ -88,7 +88,7 @@ def correspond_folders(
     del shapes
     register = partial(_register_all, samples, settings, key)
     try:
-        for count, (_, result) in enumerate(each(register, todo, workers), 1):
+        for count, (_, result) in enumerate(run_tasks(register, todo, workers), 1):
             if isinstance(result, Exception):
                 raise result
             if progress is not None:

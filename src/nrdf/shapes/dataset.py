@@ -147,8 +147,8 @@ def read_stamp(path: str | Path) -> str | None:
         return None
 
 
-def made_by(path: str | Path) -> str | None:
-    """The stamp of a shape file up to the first "+", behind which later steps add theirs."""
+def settings_stamp(path: str | Path) -> str | None:
+    """The stamp up to the first "+": how the shape was made. Later steps add the rest."""
     stamp = read_stamp(path)
     return None if stamp is None else stamp.partition("+")[0]
 
@@ -274,7 +274,7 @@ def add_to_index(folder: str | Path, rows: list[IndexRow], remove: Collection[st
         write_index(folder, rows)
 
 
-def make_folder(folder: str | Path) -> None:
+def make_data_folder(folder: str | Path) -> None:
     """Make a data folder where there is none, and tidy up what a killed run left half-written.
 
     Raises OutputError if it cannot be made, or holds something else than training shapes.

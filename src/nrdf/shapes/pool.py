@@ -1,4 +1,4 @@
-"""Many independent shapes on several processes, none of which can spoil the others."""
+"""Independent tasks on several processes; one that crashes does not stop the others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "IGL_N
 CRASHED = "the process that worked on it died: out of memory, or a fault in a library"
 
 
-def each(
+def run_tasks(
     work: Callable[[Task], Result], tasks: Sequence[Task], workers: int
 ) -> Generator[tuple[Task, Result | Exception], None, None]:
     """Each task with the result of `work(task)` or what it raised, as they come.
@@ -32,7 +32,7 @@ def each(
     """
     if workers <= 1:
         for task in tasks:
-            yield task, _attempt(work, task)
+            yield task, _result_or_error(work, task)
         return
     lost: list[Task] = []
     for task, result in _pooled(work, tasks, workers):
@@ -51,7 +51,7 @@ def _pooled(
 ) -> Iterator[tuple[Task, Result | Exception]]:
     context = get_context("spawn")
     with _one_thread_each():
-        pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _take_signals)
+        pool = ProcessPoolExecutor(min(workers, len(tasks) or 1), context, _ignore_interrupts)
         try:
             futures: dict[Future[Any], Task] = {}
             for task in tasks:
@@ -72,26 +72,26 @@ def _pooled(
                     process.terminate()
                 for process in processes:
                     process.join()
-                _let_go(pool)
+                _release_queue(pool)
                 pool.shutdown(wait=True, cancel_futures=True)
             raise
         if pool._broken:
-            _let_go(pool)
+            _release_queue(pool)
         pool.shutdown()
 
 
-def _let_go(pool: ProcessPoolExecutor) -> None:
-    """End the wait of the thread that hands a large task to processes which are no more.
+def _release_queue(pool: ProcessPoolExecutor) -> None:
+    """Close the queue on which a thread still waits to hand a task to processes that have ended.
 
-    In Python 3.10, shutting down waits for it forever; later ones do this themselves (CPython issue
-    94777).
+    Python 3.10 waits for it forever when the pool shuts down; later versions do this themselves
+    (CPython issue 94777).
     """
     queue = getattr(pool, "_call_queue", None)
     if sys.version_info < (3, 11) and queue is not None:
         queue._reader.close()
 
 
-def _attempt(work: Callable[[Task], Result], task: Task) -> Result | Exception:
+def _result_or_error(work: Callable[[Task], Result], task: Task) -> Result | Exception:
     try:
         return work(task)
     except Exception as error:
@@ -111,18 +111,18 @@ def _in_process(work: Callable[[Task], Result], task: Task) -> Result:
 
 
 def _end(*_: object) -> None:
-    # Told so again, by the pool too, it would leave the tidying up as well.
+    # A second SIGTERM, which the pool sends too, would interrupt the tidying up.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     sys.exit(1)
 
 
-def _take_signals() -> None:
+def _ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process decides what to do
 
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """No further Ctrl-C meanwhile, where this is the main thread and may say so."""
+    """Ignore Ctrl-C within the block; only the main thread can."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -135,7 +135,7 @@ def _no_interrupt() -> Iterator[None]:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Processes started meanwhile use one thread each: the pool has one process for each core."""
+    """Processes started within the block use one thread: the pool has a process for each core."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update({name: "1" for name in _THREADS})
     try:

@@ -1,4 +1,4 @@
-"""Meshes of any quality to training shapes: visible skin, outward normals, occupancy queries."""
+"""Training shapes from meshes of any quality: outer skin, outward normals, occupancy queries."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from nrdf.errors import CloudError, DataError, NrdfError, OutputError
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.winding import mesh_winding_numbers
-from nrdf.io.formats.mesh_file import load_mesh
+from nrdf.io.formats.mesh_file import MESH_ENDINGS, load_mesh
 from nrdf.shapes.dataset import (
     INDEX,
     SPLITS,
     IndexRow,
     Shape,
     add_to_index,
-    made_by,
-    make_folder,
+    make_data_folder,
+    settings_stamp,
     write_shape,
 )
 from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.pool import each
+from nrdf.shapes.pool import run_tasks
 
-ENDINGS = (".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".3mf", ".dae")
-LEAST_ENCLOSED = 0.5  # share of the skin that must have an inside behind it
+MIN_ENCLOSED = 0.5  # share of the skin that must have an inside behind it
 _PROBE = 0.002  # canonical distance behind the skin at which the inside is looked for
 _VALIDATION_EVERY = 20
 
 
 @dataclass(frozen=True)
-class Settings:
+class PrepareSettings:
     """What a prepared shape holds: points on its surface, and occupancy queries."""
 
     surface_points: int = 8192
@@ -73,7 +72,7 @@ def prepare_folder(
     out: Path,
     category: str,
     index: Path | None = None,
-    settings: Settings | None = None,
+    settings: PrepareSettings | None = None,
     workers: int = 1,
     overwrite: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -90,10 +89,10 @@ def prepare_folder(
     Raises DataError if `meshes` holds no mesh or the index is wrong, OutputError if `out` cannot
     be written.
     """
-    settings = settings or Settings()
+    settings = settings or PrepareSettings()
     paths = find_meshes(meshes)
     table = _read_provenance(meshes, index, category)
-    make_folder(out)
+    make_data_folder(out)
     report = PrepareReport()
     named: dict[str, Path] = {}
     for path in paths:
@@ -105,13 +104,13 @@ def prepare_folder(
     todo = []
     for name, path in named.items():
         target = out / f"{name}.npz"
-        if not overwrite and made_by(target) == _stamp(path, category, settings):
+        if not overwrite and settings_stamp(target) == _stamp(path, category, settings):
             report.kept.append(name)
         else:
             todo.append((name, path, _provenance(table, path).source))
     try:
         work = partial(_write_one, out, category, settings)
-        for done, ((name, path, _), result) in enumerate(each(work, todo, workers), 1):
+        for done, ((name, path, _), result) in enumerate(run_tasks(work, todo, workers), 1):
             if isinstance(result, OutputError):
                 raise result  # nothing can be written: no other shape would fare better
             if isinstance(result, Exception):
@@ -132,13 +131,13 @@ def find_meshes(folder: Path) -> list[Path]:
     """Mesh files in `folder` and below, sorted. Raises DataError if there are none."""
     if not folder.is_dir():
         raise DataError(f"no folder {folder}")
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and p.is_file())
+    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MESH_ENDINGS and p.is_file())
     if not found:
-        raise DataError(f"{folder} holds no mesh; known formats: {', '.join(ENDINGS)}")
+        raise DataError(f"{folder} holds no mesh; known formats: {', '.join(MESH_ENDINGS)}")
     return found
 
 
-def prepare_mesh(path: Path, category: str, settings: Settings, source: str = "") -> Shape:
+def prepare_mesh(path: Path, category: str, settings: PrepareSettings, source: str = "") -> Shape:
     """Training shape of the mesh file `path`.
 
     Raises DataError if the mesh is unreadable or empty, or encloses no volume.
@@ -157,10 +156,10 @@ def prepare_mesh(path: Path, category: str, settings: Settings, source: str = ""
     winding = mesh_winding_numbers(vertices, faces, places)
     # Close behind a sheet without thickness it is about one half.
     enclosed = float((winding[: len(probes)] > 0.6).mean())
-    if enclosed < LEAST_ENCLOSED:
+    if enclosed < MIN_ENCLOSED:
         raise DataError(
             f"no volume: there is an inside behind only {enclosed:.0%} of its visible surface, at "
-            f"least {LEAST_ENCLOSED:.0%} is needed; close the mesh or give its sheets a thickness"
+            f"least {MIN_ENCLOSED:.0%} is needed; close the mesh or give its sheets a thickness"
         )
     return Shape(
         name=path.stem,
@@ -175,13 +174,15 @@ def prepare_mesh(path: Path, category: str, settings: Settings, source: str = ""
     )
 
 
-def _write_one(out: Path, category: str, settings: Settings, task: tuple[str, Path, str]) -> None:
+def _write_one(
+    out: Path, category: str, settings: PrepareSettings, task: tuple[str, Path, str]
+) -> None:
     name, path, source = task
     shape = prepare_mesh(path, category, settings, source)
     write_shape(out / f"{name}.npz", shape, _stamp(path, category, settings))
 
 
-def _stamp(path: Path, category: str, settings: Settings) -> str:
+def _stamp(path: Path, category: str, settings: PrepareSettings) -> str:
     try:
         content = hashlib.sha256(path.read_bytes()).hexdigest()[:16]
     except OSError:

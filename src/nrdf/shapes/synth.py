@@ -14,13 +14,13 @@ from nrdf.shapes.dataset import (
     IndexRow,
     Shape,
     add_to_index,
-    made_by,
-    make_folder,
+    make_data_folder,
+    settings_stamp,
     write_shape,
 )
 from nrdf.shapes.families import SurfaceCoordinates, get_family
 from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.pool import each
+from nrdf.shapes.pool import run_tasks
 
 SURFACE_POINTS = 8192
 QUERIES = 16384
@@ -49,12 +49,12 @@ def synthesise(
     if seed < 0:
         raise DataError(f"a seed must not be negative, this one is {seed}")
     get_family(category)  # an unknown name is an error before anything is made
-    make_folder(out)
+    make_data_folder(out)
     seeds = range(seed, seed + count)
     stamp = f"family/1 {category} {SURFACE_POINTS} {QUERIES} {CORRESPONDENCES}"
-    todo = [s for s in seeds if made_by(out / f"{_name(category, s)}.npz") != stamp]
+    todo = [s for s in seeds if settings_stamp(out / f"{_name(category, s)}.npz") != stamp]
     make = partial(_write_member, category, out, stamp)
-    for done, (_, result) in enumerate(each(make, todo, workers), 1):
+    for done, (_, result) in enumerate(run_tasks(make, todo, workers), 1):
         if isinstance(result, Exception):
             raise result
         if progress is not None:

@@ -32,7 +32,7 @@ from nrdf.geometry.canonical import canonical_transform, rotation_about_up
 from nrdf.geometry.mesh import outer_skin
 from nrdf.geometry.similarity import upright
 from nrdf.io.formats.mesh_file import load_mesh
-from nrdf.shapes.boxes import Boxes
+from nrdf.shapes.boxes import BoxUnion
 from nrdf.shapes.dataset import INDEX
 from nrdf.shapes.prepare import find_meshes
 from nrdf.training.camera_views import (
@@ -242,7 +242,7 @@ def _heaps(count: int, rng: np.random.Generator) -> Views:
             for flat in level
         ]
         try:
-            heap = Boxes(0.4 * rng.uniform(-1, 1, (boxes, 3)), np.array(turns), size)
+            heap = BoxUnion(0.4 * rng.uniform(-1, 1, (boxes, 3)), np.array(turns), size)
             found.append(heap.sample_surface(SURFACE_POINTS, rng))
         except DataError:
             continue

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from nrdf.errors import DataError, NrdfError
-from nrdf.shapes.pool import CRASHED, each
+from nrdf.shapes.pool import CRASHED, run_tasks
 from nrdf_benchmark.bsrc.dataset import Benchmark, BenchmarkObject
 from nrdf_benchmark.methods.registry import Method, MethodSpec, build_method
 from nrdf_benchmark.metrics import score
@@ -97,7 +97,7 @@ def evaluate(
     tell = progress or (lambda *_: None)
     for name, count in counts.items():
         tell(name, count, total)
-    with closing(each(_run, tasks, min(workers, len(tasks)))) as results:
+    with closing(run_tasks(_run, tasks, min(workers, len(tasks)))) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)

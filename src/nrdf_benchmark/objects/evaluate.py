@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from nrdf.errors import DataError, NrdfError
-from nrdf.shapes.pool import CRASHED, each
+from nrdf.shapes.pool import CRASHED, run_tasks
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh
 from nrdf_benchmark.objects.jobs import JobResult, run_job
@@ -131,7 +131,7 @@ def _resumed(
             log.info("%s: %d of %d pairs were there already", name, count, totals[name])
         tell(name, count, totals[name])
     todo = [task for task in tasks if task not in done]
-    with closing(each(run, todo, min(workers, len(todo)))) as results:
+    with closing(run_tasks(run, todo, min(workers, len(todo)))) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)

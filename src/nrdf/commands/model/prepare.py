@@ -44,9 +44,9 @@ def prepare(
         overwrite: Make again what is there already.
     """
     from nrdf.io.locks import write_lock
-    from nrdf.shapes.prepare import Settings, prepare_folder
+    from nrdf.shapes.prepare import PrepareSettings, prepare_folder
 
-    settings = Settings(surface_points, queries, seed)
+    settings = PrepareSettings(surface_points, queries, seed)
     folder, cores = out or Path("data") / category, workers or os.cpu_count() or 1
     with write_lock(folder), progress_bar("meshes") as progress:
         report = prepare_folder(
