@@ -96,7 +96,7 @@ class _Working:
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """canonical to working: rotation upright(up) @ about_up(yaw)."""
+    """canonical to working: rotation upright(up) @ rotation_about_up(yaw)."""
 
     up: np.ndarray
     yaw: float
