@@ -36,7 +36,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         studio = Studio(Session(folder), server, LocalComputing(nrdf.load_model), ["chair"], {})
         studio.editor.open_knowledge(REFERENCE, read_bound_knowledge(KNOWLEDGE))
-        studio.editor.add_target(TARGETS[2], bundled(TARGETS[2]))
+        studio.editor.add_target(TARGETS[0], bundled(TARGETS[0]))
         studio.restore()
         studio.worker.wait(300)
         browser = playwright.chromium.launch(executable_path=sys.argv[1], args=list(FLAGS))
@@ -51,7 +51,7 @@ def main() -> None:
         time.sleep(5)
         page.screenshot(path=DOCS / "studio.png")
         page.get_by_role("tab", name="6 Robot").click()
-        studio.arm_simulation.start(TARGETS[2])
+        studio.arm_simulation.start(TARGETS[0])
         studio.arm_simulation.worker.wait(900)
         playback = studio.arm_simulation.playback
         assert playback is not None, "the simulation failed"

@@ -220,21 +220,21 @@ def _in_memory(most: int) -> Iterator[None]:
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_AS)
-    limit = _said("VmSize") + 4 * most
+    limit = _process_bytes("VmSize") + 4 * most
     if before[1] != resource.RLIM_INFINITY:
         limit = min(limit, before[1])
     Path("/proc/self/clear_refs").write_text("5")  # from here on anew: VmHWM
-    start = _said("VmRSS")
+    start = _process_bytes("VmRSS")
     resource.setrlimit(resource.RLIMIT_AS, (limit, before[1]))
     try:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
-    taken = _said("VmHWM") - start
+    taken = _process_bytes("VmHWM") - start
     assert taken <= most, f"took {taken / 1e9:.2f} GB"
 
 
-def _said(name: str) -> int:
+def _process_bytes(name: str) -> int:
     """Bytes that /proc says of this process."""
     for line in Path("/proc/self/status").read_text().splitlines():
         if line.startswith(name):

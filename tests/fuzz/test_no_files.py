@@ -16,7 +16,7 @@ from nrdf.toolpath.file import read_toolpaths
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 
 
-def lesson(folder, reference="ref.ply", region="region.ply"):
+def bound_knowledge(folder, reference="ref.ply", region="region.ply"):
     points, normals = box((0.5, 0.9, 0.6), 1500)
     for name, chosen in (("ref.ply", slice(None)), ("region.ply", normals[:, 1] > 0.5)):
         write_cloud(folder / name, PointCloud(points[chosen], normals[chosen], "m"))
@@ -27,26 +27,26 @@ def lesson(folder, reference="ref.ply", region="region.ply"):
 
 
 def test_knowledge_of_files_is_read(tmp_path):
-    assert set(lesson(tmp_path).regions) == {"top"}
+    assert set(bound_knowledge(tmp_path).regions) == {"top"}
 
 
-@pytest.mark.parametrize(("kind", "said"), [("pipe", "pipe"), ("folder", "fold"), ("none", "odd")])
+@pytest.mark.parametrize(("kind", "word"), [("pipe", "pipe"), ("folder", "fold"), ("none", "odd")])
 @pytest.mark.parametrize("place", ["reference", "region", "region array", "knowledge", "job"])
-def test_is_refused_at_once(tmp_path, kind, said, place):
+def test_is_refused_at_once(tmp_path, kind, word, place):
     odd = tmp_path / ("odd.npz" if place == "region array" else "odd.ply")
     if kind == "pipe":
         os.mkfifo(odd)
     elif kind == "folder":
         odd.mkdir()
     call = {
-        "reference": lambda: lesson(tmp_path, reference=odd.name),
-        "region": lambda: lesson(tmp_path, region=odd.name),
-        "region array": lambda: lesson(tmp_path, region=odd.name),
+        "reference": lambda: bound_knowledge(tmp_path, reference=odd.name),
+        "region": lambda: bound_knowledge(tmp_path, region=odd.name),
+        "region array": lambda: bound_knowledge(tmp_path, region=odd.name),
         "knowledge": lambda: read_bound_knowledge(odd),
         "job": lambda: read_toolpaths(odd),
     }[place]
     message = message_of(call)
-    assert "odd" in message and said in message
+    assert "odd" in message and word in message
 
 
 def test_a_checksum_is_of_regular_files(tmp_path):

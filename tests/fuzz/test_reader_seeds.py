@@ -79,11 +79,11 @@ def glb(change) -> bytes:
     length = struct.unpack("<I", content[12:16])[0]
     tree = json.loads(content[20 : 20 + length])
     change(tree)
-    said = json.dumps(tree).encode()
-    said += b" " * (-len(said) % 4)
+    chunk = json.dumps(tree).encode()
+    chunk += b" " * (-len(chunk) % 4)
     rest = content[20 + length :]
-    head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(said) + len(rest), len(said), 0x4E4F534A)
-    return head + said + rest
+    head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(chunk) + len(rest), len(chunk), 0x4E4F534A)
+    return head + chunk + rest
 
 
 def accessor(count):
@@ -346,14 +346,14 @@ def test_is_read_right(tmp_path, case):
 )
 def test_a_heading_with_units_is_followed(tmp_path, heading, order, unit, scale):
     for delimiter in ",; ":
-        said = heading.replace(",", delimiter)
-        (tmp_path / "a.csv").write_text(f"# {said}\n{text(POINTS[:, order], delimiter)}")
+        columns = heading.replace(",", delimiter)
+        (tmp_path / "a.csv").write_text(f"# {columns}\n{text(POINTS[:, order], delimiter)}")
         cloud = read_cloud(tmp_path / "a.csv")
         np.testing.assert_allclose(cloud.points, POINTS * scale)
         assert cloud.unit == unit
 
 
-def test_a_heading_that_names_no_axes_is_told(tmp_path, caplog):
+def test_a_heading_that_names_no_axes_is_reported(tmp_path, caplog):
     (tmp_path / "a.csv").write_text("east,north,up\n" + text(delimiter=","))
     np.testing.assert_array_equal(read_cloud(tmp_path / "a.csv").points, POINTS)
     assert "the first three columns are taken" in caplog.text

@@ -49,8 +49,8 @@ with torch.random.fork_rng():
 
 def weights(metadata) -> bytes:
     """A weight file of a tiny field, with a right checksum."""
-    said = metadata if isinstance(metadata, dict) else {}
-    text = {str(key): json.dumps(value) for key, value in said.items()}
+    entries = metadata if isinstance(metadata, dict) else {}
+    text = {str(key): json.dumps(value) for key, value in entries.items()}
     text["sha256"] = _digest(TENSORS, text)
     return save(TENSORS, metadata=text)
 

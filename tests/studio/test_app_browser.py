@@ -68,11 +68,11 @@ class Person:
 
     def __init__(self, page, studio: Studio) -> None:
         self.page, self.studio, self.shots = page, studio, 0
-        self.status: list[tuple[str, str]] = []
+        self.notes: list[tuple[str, str]] = []
         notify = studio.notify
 
         def heard(title: str, body: str, bad: bool = True) -> None:
-            self.status.append((title, body))
+            self.notes.append((title, body))
             notify(title, body, bad)
 
         studio.notify = heard
@@ -146,7 +146,7 @@ class Person:
                 if done():
                     return
                 time.sleep(0.02)
-        raise AssertionError(f"{what} did nothing; said: {self.status}")
+        raise AssertionError(f"{what} did nothing; said: {self.notes}")
 
     def new_region(self, name: str) -> None:
         count = len(self.studio.editor.document.regions)
@@ -313,8 +313,10 @@ def test_all_steps(person, studio, tmp_path):
     with page.expect_download() as knowledge:
         person.press("Knowledge file, with the reference")
     assert knowledge.value.suggested_filename == "knowledge.zip"
-    lesson = read_bound_knowledge(editor.session.folder / "saved" / "knowledge" / "chair.yaml")
-    assert list(lesson.regions) == ["seat", "back"]
+    bound_knowledge = read_bound_knowledge(
+        editor.session.folder / "saved" / "knowledge" / "chair.yaml"
+    )
+    assert list(bound_knowledge.regions) == ["seat", "back"]
     with page.expect_download() as report:
         person.press("HTML report of this target")
     assert b"<table>" in Path(report.value.path()).read_bytes()

@@ -1,6 +1,6 @@
-"""The studio: paint regions, describe their processes and see them on other objects, in a browser.
+"""The studio: paint regions, describe their processes and transfer them, in a browser.
 
-State and its changes (`session`, `painting`, `view`, `teaching`, `saving`) know nothing of the
-browser; `app` and the panels show them with viser. Whatever is computed is computed by the
-functions that the command line uses.
+In: a reference, targets and the inputs of a person. Out: a saved session, and what the command
+line reads: knowledge, jobs, robot programs, simulations. `model` knows nothing of the browser;
+`scene` and `panels` show it with viser; `app` puts them together.
 """

@@ -90,10 +90,10 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
         there.transfer(editor.document, give_up)
     editor.change_numbers("top", 0, {"stepover_mm": 20.0})
     there.transfer(editor.document, silent)
-    taught = (
+    process = (
         there.by_target["new"].transfer_result.bound_knowledge.knowledge.regions[0].processes[0]
     )
-    assert taught.stepover_m == 0.02, "what was changed after it was given up"
+    assert process.stepover_m == 0.02, "what was changed after it was cancelled"
 
     write_cloud(tmp_path / "box.ply", cloud())
     content = (tmp_path / "box.ply").read_bytes()

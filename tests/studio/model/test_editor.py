@@ -44,7 +44,7 @@ def test_names_of_targets_are_no_paths_and_differ(painted):
     assert painted.object_keys() == [REFERENCE, "passwd-2"]
 
 
-def test_overlaps_are_told(painted):
+def test_overlaps_are_reported(painted):
     painted.add_region("front")
     painted.paint(REFERENCE, "front", painted.document.region("top").mask)
     assert "top" in painted.overlaps()[0] and "front" in painted.overlaps()[0]

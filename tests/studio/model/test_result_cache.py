@@ -30,7 +30,7 @@ def test_plans_hold_as_long_as_what_they_are_of(results):
     assert results.plan(editor.document.regions[0], 0).checked.process.stepover_m == 0.02
 
 
-def test_a_plan_that_cannot_be_is_told_by_field_and_value(results):
+def test_a_plan_that_is_refused_is_named_by_field_and_value(results):
     results.editor.change_numbers("top", 0, {"feed_mm_s": 0.0})
     results.editor.change_numbers("front", 0, {"edge_margin_mm": 900.0})
     results.make_plans(results.editor.document, silent)
@@ -50,7 +50,7 @@ def test_planning_can_be_cancelled_and_keeps_what_is_done(results):
     assert results.plan(top, 0) is not None and results.plan(front, 0) is None
 
 
-def test_a_transfer_holds_until_what_was_taught_changes(results):
+def test_a_transfer_holds_until_the_processes_change(results):
     editor, seen = results.editor, []
     results.transfer(editor.document, lambda done, total: seen.append((done, total)))
     assert results.is_current("new") and seen[-1][0] > seen[0][0]
@@ -87,12 +87,15 @@ def test_a_region_painted_on_the_target_is_taken_as_it_is(results):
 
 
 def test_a_marked_region_must_be_taught_and_on_the_target(results, untrained):
-    lesson = bound_knowledge_of(results.editor.session.clouds, results.editor.document)
-    teacher, target = ProcessTransfer(lesson, nrdf.load_model(untrained)), cloud(seed=1)
+    bound_knowledge = bound_knowledge_of(results.editor.session.clouds, results.editor.document)
+    process_transfer, target = (
+        ProcessTransfer(bound_knowledge, nrdf.load_model(untrained)),
+        cloud(seed=1),
+    )
     with pytest.raises(RegionError, match="no taught region 'lid'; known: top, front"):
-        teacher.transfer(target, marked={"lid": [1, 2]})
+        process_transfer.transfer(target, marked={"lid": [1, 2]})
     with pytest.raises(RegionError, match=r"region 'top' on the target: .*are not on"):
-        teacher.transfer(target, marked={"top": [[9.0, 9.0, 9.0]]})
+        process_transfer.transfer(target, marked={"top": [[9.0, 9.0, 9.0]]})
 
 
 def test_an_incomplete_document_is_refused(results):

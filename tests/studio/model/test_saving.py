@@ -30,10 +30,10 @@ def test_knowledge_goes_out_and_comes_back(painted, tmp_path):
     painted.change_step("top", 0, parameters={"grit": 120})
     place = save_knowledge(painted)
     assert save_knowledge(painted) == place, "it can be saved again"
-    lesson = read_bound_knowledge(place / "chair.yaml")
+    bound_knowledge = read_bound_knowledge(place / "chair.yaml")
     assert read_knowledge(place / "chair.yaml").regions[0].processes[0].parameters["grit"] == 120
     other = Editor(Session(tmp_path / "other"))
-    other.open_knowledge("reference", lesson)
+    other.open_knowledge("reference", bound_knowledge)
     (region,) = other.document.regions
     assert (region.mask == painted.document.regions[0].mask).all()
     (step,), (made,) = region.steps, painted.document.regions[0].steps

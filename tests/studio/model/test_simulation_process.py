@@ -25,12 +25,12 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
     monkeypatch,
 ):
     monkeypatch.setenv("MUJOCO_GL", "off")  # pictures take long, and have tests of their own
-    seen, said = [], []
+    seen, phases = [], []
     running = SimulationProcess(plate_job)
-    made = running.run(lambda done, total: seen.append(done / total), said.append)
+    made = running.run(lambda done, total: seen.append(done / total), phases.append)
     assert made.report["total"]["waypoints"] == 27 and made.seconds > 5
     assert sorted(set(seen)) == sorted(set(seen), key=seen.index) and 0 < seen[-1] < 1
-    assert any("top, sand: " in phase for phase in said)
+    assert any("top, sand: " in phase for phase in phases)
     report = running.write(tmp_path / "sim", "plate", {"command": "nrdf studio"}, silent)
     assert json.loads((tmp_path / "sim" / "report.json").read_text())["title"] == "plate"
     assert {"joints.csv", "report.html"} <= set(report["files"])
@@ -54,19 +54,19 @@ def test_cancelling_ends_the_process(plate_job):
 
     with pytest.raises(Cancelled):
         running.run(cancelled)
-    told, waits = [], threading.Event()
+    outcomes, waits = [], threading.Event()
 
     def wait():
         with pytest.raises(Cancelled):
             running.run(lambda done, total: waits.set())
-        told.append("cancelled")
+        outcomes.append("cancelled")
 
     waiting = threading.Thread(target=wait)
     waiting.start()
     assert waits.wait(10)
     running.end()
     waiting.join(10)
-    assert not running._child._process.is_alive() and told == ["cancelled"]
+    assert not running._child._process.is_alive() and outcomes == ["cancelled"]
 
 
 def test_without_mujoco_it_says_what_to_install(monkeypatch):

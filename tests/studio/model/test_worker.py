@@ -14,11 +14,11 @@ class Log:
     """What a worker says, and a worker that says it."""
 
     def __init__(self):
-        self.said = []
+        self.lines = []
         self.worker = Worker(
-            lambda what: self.said.append(what),
-            lambda done, total: self.said.append((done, total)),
-            lambda what, error: self.said.append((what, error)),
+            lambda what: self.lines.append(what),
+            lambda done, total: self.lines.append((done, total)),
+            lambda what, error: self.lines.append((what, error)),
         )
 
 
@@ -29,11 +29,11 @@ def log():
     made.worker.stop()
 
 
-def test_progress_and_end_are_told(log):
+def test_progress_and_end_are_reported(log):
     log.worker.submit("plan", "planning", lambda progress: progress(1, 2))
     assert log.worker.wait(5)
-    until_told(log, ("planning", ""))
-    assert log.said == ["planning", (1, 2), ("planning", "")]
+    until_logged(log, ("planning", ""))
+    assert log.lines == ["planning", (1, 2), ("planning", "")]
 
 
 def test_cancelling_stops_at_the_next_step(log):
@@ -43,16 +43,16 @@ def test_cancelling_stops_at_the_next_step(log):
         begun.set()
         go_on.wait(5)
         progress(1, 2)
-        log.said.append("not reached")
+        log.lines.append("not reached")
 
     log.worker.submit("transfer", "transfer", work)
     begun.wait(5)
-    log.worker.submit("plan", "planning", lambda progress: log.said.append("waiting work"))
+    log.worker.submit("plan", "planning", lambda progress: log.lines.append("waiting work"))
     log.worker.cancel()
     go_on.set()
     assert log.worker.wait(5)
-    until_told(log, ("transfer", "cancelled"))
-    assert "not reached" not in log.said and "waiting work" not in log.said
+    until_logged(log, ("transfer", "cancelled"))
+    assert "not reached" not in log.lines and "waiting work" not in log.lines
 
 
 def test_the_newest_of_a_kind_replaces_what_waits_and_runs(log):
@@ -62,26 +62,26 @@ def test_the_newest_of_a_kind_replaces_what_waits_and_runs(log):
         begun.set()
         go_on.wait(5)
         progress(0, 1)
-        log.said.append("old")
+        log.lines.append("old")
 
     log.worker.submit("plan", "first", slow)
     begun.wait(5)
     for name in ("second", "third"):
-        log.worker.submit("plan", name, lambda progress, name=name: log.said.append(name))
+        log.worker.submit("plan", name, lambda progress, name=name: log.lines.append(name))
     go_on.set()
     assert log.worker.wait(5)
-    until_told(log, ("third", ""))
-    assert "old" not in log.said and "second" not in log.said and "third" in log.said
+    until_logged(log, ("third", ""))
+    assert "old" not in log.lines and "second" not in log.lines and "third" in log.lines
 
 
 def test_a_delayed_job_that_is_replaced_never_begins(log):
-    log.worker.submit("plan", "first", lambda progress: log.said.append("ran"), delay_s=30.0)
-    log.worker.submit("plan", "second", lambda progress: log.said.append("second ran"))
+    log.worker.submit("plan", "first", lambda progress: log.lines.append("ran"), delay_s=30.0)
+    log.worker.submit("plan", "second", lambda progress: log.lines.append("second ran"))
     assert log.worker.wait(5)
-    assert "ran" not in log.said and "first" not in log.said and "second ran" in log.said
+    assert "ran" not in log.lines and "first" not in log.lines and "second ran" in log.lines
 
 
-def test_faults_are_told_and_the_worker_goes_on(log, caplog):
+def test_faults_are_reported_and_the_worker_goes_on(log, caplog):
     def refused(progress):
         raise ProcessError("feed_m_s: must be above 0")
 
@@ -92,15 +92,15 @@ def test_faults_are_told_and_the_worker_goes_on(log, caplog):
     log.worker.submit("b", "broken", broken)
     log.worker.submit("c", "fine", lambda progress: None)
     assert log.worker.wait(5)
-    until_told(log, ("fine", ""))
-    assert ("refused", "feed_m_s: must be above 0") in log.said
-    assert any("RuntimeError: oh" in str(line) for line in log.said)
+    until_logged(log, ("fine", ""))
+    assert ("refused", "feed_m_s: must be above 0") in log.lines
+    assert any("RuntimeError: oh" in str(line) for line in log.lines)
 
 
-def until_told(log, line):
-    """`wait` may end just before the end is told."""
+def until_logged(log, line):
+    """`wait` may end just before the end is reported."""
     for _ in range(500):
-        if line in log.said:
+        if line in log.lines:
             return
         threading.Event().wait(0.01)
-    raise AssertionError(f"{line} was not told: {log.said}")
+    raise AssertionError(f"{line} was not reported: {log.lines}")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 
 def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
-    told = page.change(feed_mm_s=0.0)
-    assert told.startswith("⚠ region 'top'")
-    assert "feed_m_s (*Feed, mm/s*): must be above 0.0, not 0.0" in told
+    status = page.change(feed_mm_s=0.0)
+    assert status.startswith("⚠ region 'top'")
+    assert "feed_m_s (*Feed, mm/s*): must be above 0.0, not 0.0" in status
     assert "feed_m_s: must be above 0.0" in page.transfer()
-    told = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
-    assert "stepover_m (*Stepover, mm*) is 2 (2000 mm), above what is plausible" in told
+    status = page.change(feed_mm_s=100.0, stepover_mm=2000.0)
+    assert "stepover_m (*Stepover, mm*) is 2 (2000 mm), above what is plausible" in status
 
 
 def test_tool_clearance(page):

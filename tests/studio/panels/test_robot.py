@@ -7,7 +7,7 @@ import json
 import pytest
 
 
-def test_verdicts_are_told_in_words(playback):
+def test_verdicts_in_words(playback):
     pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
     from nrdf.studio.panels.robot import summary
 
@@ -17,7 +17,7 @@ def test_verdicts_are_told_in_words(playback):
     (path,) = report["paths"]
     path["verdicts"] |= {"reached": 20, "singular": 3, "too fast": 4}
     path["collisions"] = [{"what": "floor", "depth_m": 0.0123}]
-    said = summary(report)
-    assert "⚠ **top**, not reached: 3 singular, 4 too fast." in said
-    assert "*singular*: at a singularity" in said and "*limit*" not in said
-    assert "⚠ **top**: 1 move collides, with the floor by up to 12.3 mm" in said
+    text = summary(report)
+    assert "⚠ **top**, not reached: 3 singular, 4 too fast." in text
+    assert "*singular*: at a singularity" in text and "*limit*" not in text
+    assert "⚠ **top**: 1 move collides, with the floor by up to 12.3 mm" in text

@@ -19,14 +19,14 @@ def test_a_target_is_removed_and_corrections_are_discarded(page):
     assert not editor.target("new").corrected
 
 
-def test_results_are_told_in_words(page):
+def test_results_in_words(page):
     tab = page.studio.panel.targets
     page.does(tab.refresh)
     assert "press *Transfer the process*" in tab.status.content
     page.transfer()
-    said = tab.status.content
-    assert said.startswith("**new**: ") and "| region | process | confidence |" in said
-    assert "top | sand |" in said and "before your last change" not in said
+    text = tab.status.content
+    assert text.startswith("**new**: ") and "| region | process | confidence |" in text
+    assert "top | sand |" in text and "before your last change" not in text
     page.editor.change_numbers("top", 0, {"stepover_mm": 15.0})
     page.does(tab.refresh)
     assert "**new** *(of before your last change)*" in tab.status.content
