@@ -18,6 +18,8 @@ import pytest
 import nrdf
 from nrdf import cli
 from nrdf.bundled import KNOWLEDGE, bundled_chair
+from nrdf.process.bound_knowledge import resolve
+from nrdf.process.knowledge_file import read_knowledge
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -103,6 +105,16 @@ def headings(page: Path) -> set[str]:
     return {re.sub(r"\s+", "-", line.strip()) for line in plain}
 
 
+def small_process() -> nrdf.ProcessTransfer:
+    """What is done to the bundled chair's seat alone, in few lines."""
+    knowledge = read_knowledge(KNOWLEDGE)
+    (seat,) = (region for region in knowledge.regions if region.name == "seat")
+    wide = {"stepover_m": 0.1, "overlap": None, "trajectory": "raster"}
+    seat = seat.model_copy(update={"processes": [seat.processes[0].model_copy(update=wide)]})
+    few = knowledge.model_copy(update={"regions": [seat]})
+    return nrdf.ProcessTransfer(resolve(few, KNOWLEDGE.parent), nrdf.load_model("chair"))
+
+
 @pytest.fixture(scope="module")
 def workplace(tmp_path_factory):
     """A folder with the files that the pages name: ref.ply, seat.ply, new.ply, scan.ply, ..."""
@@ -118,8 +130,7 @@ def workplace(tmp_path_factory):
     # As a scanner would have it: z up.
     turned = target.points @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     nrdf.write_cloud(folder / "scan.ply", nrdf.PointCloud(turned, unit="m"))
-    process = nrdf.load_process(KNOWLEDGE)
-    nrdf.write_job(folder / "job", process.transfer(target))
+    nrdf.write_job(folder / "job", small_process().transfer(target))
     for path in KNOWLEDGE.parent.iterdir():
         if path.suffix in (".yaml", ".npz", ".ply"):
             (folder / path.name).write_bytes(path.read_bytes())
