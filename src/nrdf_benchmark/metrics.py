@@ -15,7 +15,7 @@ from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf_benchmark.bsrc.dataset import OPPOSITE_SIDES, ROIS, BenchmarkObject
 
 VERSION = 1
-"""Raised when a metric's value changes: figures of different versions are not mixed."""
+"""Raised when a metric's value changes: results of different versions are not mixed."""
 MISSED = 1.0
 """Chamfer distance that a region found nowhere is counted with: about the object's own length."""
 SIDE_REACH = 0.05
@@ -155,8 +155,8 @@ def side_accuracy(
     are the retrieved points within `SIDE_REACH` of either. One is on the true side if, of the
     points of both, the nearest in (x, 0.1·normal) belongs to `side`. None if no point counts.
     """
-    places = cKDTree(points[np.union1d(side, opposite)])
-    near = found[places.query(points[found])[0] <= SIDE_REACH]
+    tree = cKDTree(points[np.union1d(side, opposite)])
+    near = found[tree.query(points[found])[0] <= SIDE_REACH]
     if len(near) == 0:
         return None
     features = oriented_features(points, normals, NORMAL_WEIGHT)

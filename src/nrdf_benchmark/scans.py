@@ -39,7 +39,7 @@ NOISE = 0.001 / 0.9  # of depth, on objects whose longest side is 1: 1 mm on a 0
 KINDS = {"full": 0, "3 views": 3, "1 view": 1}
 """Cameras of each kind of scan; 0 is the full surface."""
 LEAST = 20  # points of the surface, of 8192, from which a region counts as there
-SHARED = 0.5  # share of its places that the target has, likewise; engines may be elsewhere
+SHARED = 0.5  # share of its points that the target has, likewise; engines may be elsewhere
 SEEN, UNSEEN = 0.3, 0.02
 """Share of a region's due points in a scan, from which it was seen, and below which it was not."""
 UP = up_axis("z")
@@ -200,19 +200,24 @@ def score_regions(
     rng = np.random.default_rng([first_seed, pair])
     reference = family.member(first_seed + 2 * pair)
     target = family.member(first_seed + 2 * pair + 1)
-    taught_on = reference.sample_surface(CLOUD_POINTS, rng)
+    reference_surface = reference.sample_surface(CLOUD_POINTS, rng)
     surface = target.sample_surface(CLOUD_POINTS, rng)
     mesh = tessellate(target)
     item = KnownObject(str(pair), "family", mesh.vertices, mesh.faces, surface.points)
-    names, true = family.region_of(taught_on.coordinates), family.region_of(surface.coordinates)
+    names, true = (
+        family.region_of(reference_surface.coordinates),
+        family.region_of(surface.coordinates),
+    )
     regions = {r: names == r for r in family.region_names if (names == r).sum() >= LEAST}
     share = {r: float((true == r).mean()) for r in regions}
-    exists = target.locate(taught_on.coordinates).exists
+    exists = target.locate(reference_surface.coordinates).exists
     shared = {r for r, mask in regions.items() if exists[mask].mean() >= SHARED}
     regions = {r: mask for r, mask in regions.items() if r in shared or share[r] == 0}
-    encoded = scorer.model.encode(PointCloud(taught_on.points, taught_on.normals))
-    taught = EncodedReference(scorer.model, encoded)
-    matches = taught.retrieve_all(regions, PointCloud(surface.points), drop_absent=drop_absent)
+    encoded = scorer.model.encode(PointCloud(reference_surface.points, reference_surface.normals))
+    encoded_reference = EncodedReference(scorer.model, encoded)
+    matches = encoded_reference.retrieve_all(
+        regions, PointCloud(surface.points), drop_absent=drop_absent
+    )
     results = _compare("canonical", pair, matches, surface.points, true, share)
     for kind in KINDS:
         pose = random_pose(rng)
@@ -223,7 +228,7 @@ def score_regions(
             cloud, shape = scan.cloud, pose.to_canonical(scan.cloud.points)
             seen = _labels(family, mesh, scan)
         found = clean_and_align(scorer, cloud, UP)
-        matches = taught.retrieve_all(regions, found.encode(), drop_absent=drop_absent)
+        matches = encoded_reference.retrieve_all(regions, found.encode(), drop_absent=drop_absent)
         matches = {name: match.in_scan(found) for name, match in matches.items()}
         results += _compare(kind, pair, matches, shape, seen, share)
     return results

@@ -31,7 +31,7 @@ from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 EDGE = 0.55
 """The grid reaches this far from the centre along each axis; the shape 0.5."""
 PUBLISHED: dict[str, dict[str, tuple[float, float]]] = {}
-"""Category to method to the paper's CD-L1 and MSE. Empty: this project does not know the figures of
+"""Category to method to the paper's CD-L1 and MSE. Empty: this project does not know the values of
 the paper's Table I; where they are entered, the table has rows of them."""
 _CHUNK = 8192  # queries at a time
 
@@ -227,7 +227,7 @@ def _explained(task: _Task, error: Exception) -> Exception:
 
 
 def table(results: Sequence[ShapeResult], category: str, settings: Settings) -> str:
-    """Markdown: a row a method, the published ones below, and how the figures are made."""
+    """Markdown: a row a method, the published ones below, and how the metrics are computed."""
     shapes = results[0].shapes
     lines = [
         f"| {category}, {len(shapes)} shapes | CD-L1 | MSE | empty |",
@@ -270,9 +270,9 @@ def write_results(
     writer.writerow(["category", "method", "shape", "cd_l1", "mse", "empty"])
     for result in results:
         for shape in result.shapes:
-            figures = f"{shape.cd_l1:.9g}", f"{shape.mse:.9g}", int(shape.is_empty)
+            metrics = f"{shape.cd_l1:.9g}", f"{shape.mse:.9g}", int(shape.is_empty)
             names = category, result.spec.name, shape.name
-            writer.writerow([*map(spreadsheet_text, names), *figures])
+            writer.writerow([*map(spreadsheet_text, names), *metrics])
     content = {
         **provenance,
         "category": category,

@@ -1,6 +1,6 @@
 """Tool paths planned on known regions: families' own, and the benchmark's as labelled.
 
-Clouds are scaled to `SIZE_M` on their longest side. Only planning is judged here: no region is
+Clouds are scaled to `SIZE_M` on their longest side. Only planning is measured: no region is
 retrieved.
 """
 
@@ -37,7 +37,7 @@ SMALLEST_REGION = 20  # points
 NEAR_M = 1e-3
 
 Exact = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Which of places (n, 3), m, with outward normals (n, 3), lie within `NEAR_M` of the surface."""
+"""Which of positions (n, 3), m, with outward normals (n, 3), lie within `NEAR_M` of the surface."""
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ def family_members(category: str, members: int) -> Iterator[PlanningObject]:
         yield PlanningObject(str(seed), SIZE_M * sample.points, sample.normals, regions, exact)
 
 
-def _near_member(member: Member, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _near_member(member: Member, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
     inside, outside = (
-        member.occupancy((places + side * NEAR_M * normals) / SIZE_M) for side in (-1.0, 1.0)
+        member.occupancy((positions + side * NEAR_M * normals) / SIZE_M) for side in (-1.0, 1.0)
     )
     return inside & ~outside
 
@@ -148,8 +148,8 @@ def _near(exact: Exact, segments: Iterable[Segment], strategy: Strategy) -> floa
     work = [segment for segment in segments if segment.kind == "process"]
     held = Rotation.from_quat(np.concatenate([s.quaternions_xyzw for s in work])).as_matrix()
     axes = held[:, :, 2]
-    places = np.concatenate([s.positions for s in work]) + strategy.standoff_m * axes
-    return float(exact(places, -axes).mean())
+    positions = np.concatenate([s.positions for s in work]) + strategy.standoff_m * axes
+    return float(exact(positions, -axes).mean())
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""How the overlap that is to be expected is fitted, and judged on what it was not fitted to."""
+"""How the overlap that is to be expected is fitted, and measured on what it was not fitted to."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_without_absent_parts_there_is_nothing_to_fit():
         presence.fit(there)
 
 
-def test_what_was_measured_is_load_or_collect(tmp_path):
+def test_what_was_measured_is_not_measured_again(tmp_path):
     asked = []
 
     def collect():

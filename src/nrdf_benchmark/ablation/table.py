@@ -32,7 +32,7 @@ from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 from nrdf_benchmark.result_cache import PairCache
 
 PUBLISHED: dict[str, dict[str, float]] = {}
-"""Category to variant to the paper's mean CD-L1. Empty: this project does not know the figures of
+"""Category to variant to the paper's mean CD-L1. Empty: this project does not know the values of
 the paper's Table III; where they are entered, the table has a column of them."""
 BY_POINTS = "nrdf-paper"
 """Method that associates by the paper's eq. 9."""

@@ -68,8 +68,8 @@ def truth_of(labels: Labels, mesh: LabelledMesh, cloud: LabelledCloud) -> Truth:
     """
     share = {name: cloud.share(name) for name in labels.parts}
     mixed = sum(cloud.share(name) for name in labels.ignored)
-    carried = {*np.unique(mesh.label).tolist()}
-    lacked = tuple(name for name in labels.parts if name not in carried)
+    present = {*np.unique(mesh.label).tolist()}
+    lacked = tuple(name for name in labels.parts if name not in present)
     parts = tuple(parts_of(labels, cloud))
     return Truth(share, parts, lacked if mixed < LEAST_SHARE else (), mixed)
 

@@ -36,7 +36,7 @@ STEM = "objects"
 
 @dataclass(frozen=True)
 class Report:
-    """Figures of every method and pair, the sets of pairs that they are summed up by, and jobs."""
+    """Results of every method and pair, the sets of pairs that they are summed up by, and jobs."""
 
     results: Sequence[ObjectPairResult]
     sets: Mapping[str, Pairs]
@@ -133,8 +133,8 @@ EXPLANATION = (
     "as 0. Points of the target's pieces that serve two functions (`mixed`) are left out.",
     "",
     "Mean: over all those pairs and parts. Plain: the same where the reference has no mixed "
-    "pieces; from one that has, only some of a part is taught (the front legs, where the rear ones "
-    "go on as the back's posts).",
+    "pieces; from one that has, only some of a part is a region (the front legs, where the rear "
+    "ones go on as the back's posts).",
     "",
     "Told absent: parts that the target has and shows, reported absent or not observed. "
     f"Skipped: those, and parts found with less mean confidence than {MIN_CONFIDENCE:g}, "

@@ -1,4 +1,4 @@
-"""`nrdf eval objects`: results of pairs, and what is cache of them."""
+"""`nrdf eval objects`: results of pairs, and what the cache has of them."""
 
 from __future__ import annotations
 
