@@ -1,0 +1,218 @@
+"""The surface that paths are planned on: an object's outer skin as triangles, faces outward."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import igl
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.errors import DataError, ProcessError
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.mesh import Mesh
+from nrdf.surface.mesh_repair import repaired_skin
+
+_FACING = 0.5  # least cosine between a face's normal and the side asked for
+_MOST_SAMPLES = 200_000  # patches of area that smooth normals are averaged from
+_ROUNDS, _SETTLED = 8, 1e-3  # of an average that finds the side it faces, and its last turn, rad
+_PER_RADIUS, _NEIGHBOURS = 2.5, 48  # patches along a tool's radius, and under the whole tool
+_AT_ONCE = 1 << 15
+_SIDES = unit_vectors(
+    np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
+)
+"""Directions (26, 3); none is farther than 28° from one of them."""
+
+
+@dataclass(frozen=True)
+class NearestPoints:
+    """Places on a mesh (m, 3), m; the faces (m,) that they lie on, with outward unit normals
+    (m, 3); how far they are, distances (m,), m."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    distances: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class TargetMesh:
+    """vertices: (v, 3) float64, m. faces: (f, 3) vertex indices, outward. repairs: what was changed
+    of the mesh that was given, in words."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    repairs: tuple[str, ...] = ()
+    _found: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def from_mesh(mesh: Mesh) -> TargetMesh:
+        """The outer skin of a mesh in metres, at its own resolution.
+
+        Equal vertices are merged; faces without area, repeated and hidden faces are removed; the
+        others are turned outwards. Raises ProcessError for what is no surface.
+        """
+        try:
+            vertices, faces, repairs = repaired_skin(mesh.vertices, mesh.faces)
+        except DataError as error:
+            raise ProcessError(f"no paths can be planned on this mesh: {error}") from error
+        return TargetMesh(vertices, faces, repairs)
+
+    @cached_property
+    def face_normals(self) -> np.ndarray:
+        """(f, 3): outward unit normals."""
+        return unit_vectors(self._cross)
+
+    @cached_property
+    def face_areas(self) -> np.ndarray:
+        """(f,), m²."""
+        return np.asarray(np.linalg.norm(self._cross, axis=1) / 2.0)
+
+    @cached_property
+    def vertex_normals(self) -> np.ndarray:
+        """(v, 3): outward unit normals, of the faces around weighted by their angles."""
+        kind = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_ANGLE
+        normals = igl.per_vertex_normals(self.vertices, self.faces, kind)
+        return unit_vectors(np.nan_to_num(np.asarray(normals)))
+
+    @cached_property
+    def edge_length(self) -> float:
+        """Typical length of an edge, m: the median."""
+        corners = self.vertices[self.faces]
+        return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+
+    @cached_property
+    def size(self) -> float:
+        """Longest side of the bounding box, m."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
+    def _cross(self) -> np.ndarray:
+        a, b, c = (self.vertices[corner] for corner in self.faces.T)
+        return np.cross(b - a, c - a)
+
+    def nearest(self, points: np.ndarray, outward: np.ndarray | None = None) -> NearestPoints:
+        """The nearest places on the mesh to points (m, 3), m.
+
+        outward: (m, 3). With it, the nearest place whose face looks that way (within 60°, and in
+        any case within 90°), so that the two sides of a thin sheet are kept apart. Where no face
+        of the mesh looks that way, the nearest place of all.
+        """
+        points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+        if not len(points):
+            return NearestPoints(points, np.zeros(0, np.int64), points, np.zeros(0))
+        squared, faces, places = self._nearest_of_side(points, -1)
+        if outward is not None:
+            outward = unit_vectors(np.asarray(outward, dtype=np.float64))
+            facing = np.einsum("ma,ma->m", self.face_normals[faces], outward)
+            other = np.flatnonzero(facing < _FACING)
+            side = (outward[other] @ _SIDES.T).argmax(axis=1)
+            for number in np.unique(side):
+                asked = other[side == number]
+                found = self._nearest_of_side(points[asked], int(number))
+                squared[asked], faces[asked], places[asked] = found
+        distances = np.sqrt(np.maximum(squared, 0.0))
+        return NearestPoints(places, faces, self.face_normals[faces], distances)
+
+    def _nearest_of_side(
+        self, points: np.ndarray, side: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Squared distances (m,), faces (m,) and places (m, 3) on the faces that look to one of
+        `_SIDES`, or on all for -1."""
+        if side not in self._found:
+            chosen = np.arange(len(self.faces))
+            if side >= 0:
+                facing = self.face_normals @ _SIDES[side] > _FACING
+                chosen = np.flatnonzero(facing) if facing.any() else chosen
+            faces = np.ascontiguousarray(self.faces[chosen])
+            tree = igl.AABB()
+            tree.init(self.vertices, faces)
+            self._found[side] = (tree, chosen, faces)
+        tree, chosen, faces = self._found[side]
+        squared, face, places = tree.squared_distance(self.vertices, faces, points)
+        return np.array(squared), chosen[np.asarray(face)], np.array(places)
+
+    def smooth_normals(self, points: np.ndarray, faces: np.ndarray, radius_m: float) -> np.ndarray:
+        """Outward unit normals (m, 3) at points (m, 3), m, on `faces` (m,): what a flat tool feels.
+
+        The average over the area within `radius_m` whose normals turn less than 60° from the
+        average itself, which is found from the face's own normal.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        normals = np.array(self.face_normals[faces], dtype=np.float64)
+        for start in range(0, len(points), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            normals[part] = self._smooth_at_once(points[part], normals[part], radius_m)
+        return normals
+
+    def _smooth_at_once(
+        self, points: np.ndarray, normals: np.ndarray, radius_m: float
+    ) -> np.ndarray:
+        tree, weighted, directions = self._patches(radius_m)
+        away, near = tree.query(
+            points, min(_NEIGHBOURS, tree.n), distance_upper_bound=1.5 * radius_m
+        )
+        there = np.isfinite(away)
+        near = np.where(there, near, 0)
+        weight = np.maximum(1.0 - (away / (1.5 * radius_m)) ** 2, 0.0) ** 2 * there
+        turning = np.arange(len(points))
+        for _ in range(_ROUNDS):
+            facing = np.einsum("mka,ma->mk", directions[near[turning]], normals[turning])
+            share = weight[turning] * np.maximum(facing - _FACING, 0.0)
+            mean = np.einsum("mk,mka->ma", share, weighted[near[turning]])
+            found = np.where(mean.any(axis=1)[:, None], unit_vectors(mean), normals[turning])
+            turned = np.linalg.norm(found - normals[turning], axis=1) > _SETTLED
+            normals[turning] = found
+            turning = turning[turned]
+            if not len(turning):
+                break
+        return normals
+
+    def _patches(self, radius_m: float) -> tuple[cKDTree, np.ndarray, np.ndarray]:
+        """Middles of patches of a fraction of the tool's size; normals (p, 3) times area, and unit
+        normals (p, 3)."""
+        size = max(radius_m / _PER_RADIUS, float(np.sqrt(self.face_areas.sum() / _MOST_SAMPLES)))
+        key = ("patches", size)
+        if key not in self._found:
+            middles, face, areas = _split_to_size(self.vertices[self.faces], size)
+            normals = self.face_normals[face]
+            # One patch for each cell and side that the normals look to.
+            cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
+            side = (normals @ _SIDES.T).argmax(axis=1)
+            _, number = np.unique(np.column_stack([cell, side]), axis=0, return_inverse=True)
+            number = number.reshape(-1)
+            total = np.bincount(number, areas)
+            centre = [np.bincount(number, areas * middles[:, a]) / total for a in range(3)]
+            weighted = [np.bincount(number, areas * normals[:, a]) for a in range(3)]
+            sums = np.stack(weighted, axis=1)
+            self._found[key] = (cKDTree(np.stack(centre, axis=1)), sums, unit_vectors(sums))
+        found: tuple[cKDTree, np.ndarray, np.ndarray] = self._found[key]
+        return found
+
+    def submesh(self, face_mask: np.ndarray) -> TargetMesh:
+        """The faces of a mask (f,) with the vertices that they use."""
+        used, faces = np.unique(self.faces[face_mask], return_inverse=True)
+        return TargetMesh(self.vertices[used], faces.reshape(-1, 3), self.repairs)
+
+
+def _split_to_size(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles (p, 3) of the parts of triangles (f, 3, 3), halved at their longest edge until no
+    edge is longer than `size`; the triangle (p,) that each belongs to; their areas (p,)."""
+    whole = np.arange(len(corners))
+    parts: list[tuple[np.ndarray, np.ndarray]] = []
+    while len(corners):
+        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        longest = edges.argmax(axis=1)
+        small = edges.max(axis=1) <= size
+        parts.append((corners[small], whole[small]))
+        corners, whole, longest = corners[~small], whole[~small], longest[~small]
+        row = np.arange(len(corners))
+        a, b = corners[row, longest], corners[row, (longest + 1) % 3]
+        c, middle = corners[row, (longest + 2) % 3], (a + b) / 2.0
+        corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+        whole = np.concatenate([whole, whole])
+    corners, whole = (np.concatenate(kind) for kind in zip(*parts, strict=True))
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return corners.mean(axis=1), whole, np.linalg.norm(cross, axis=1) / 2.0

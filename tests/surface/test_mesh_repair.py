@@ -1,0 +1,41 @@
+"""Meshes as they come, made fit for planning or refused."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from nrdf.errors import DataError
+from nrdf.surface.mesh_repair import hidden_faces, repaired_skin
+
+
+def test_what_does_no_harm_is_repaired_and_said():
+    box = trimesh.creation.box((1, 1, 1))
+    faces = np.concatenate([box.faces[:6], box.faces[6:, ::-1], box.faces[:2], [[3, 3, 4]]])
+    vertices, skin, repairs = repaired_skin(np.asarray(box.vertices), faces)
+    assert len(skin) == 12 and trimesh.Trimesh(vertices, skin).is_watertight
+    assert trimesh.Trimesh(vertices, skin).volume == pytest.approx(1.0)
+    assert repairs == ("3 faces without area or given twice removed", "6 faces turned outwards")
+
+
+def test_edges_of_more_than_two_faces_are_split():
+    box, fin = trimesh.creation.box((1, 1, 1)), np.array([[0.5, 0.5, -0.5], [0.5, 0.5, 0.5]])
+    vertices = np.concatenate([box.vertices, fin, [[1.0, 1.0, 0.0]]])
+    faces = np.concatenate([box.faces, [[8, 9, 10]]])
+    vertices, skin, repairs = repaired_skin(vertices, faces)
+    assert len(skin) == 13 and any("doubled" in repair for repair in repairs)
+
+
+def test_the_covered_ends_of_parts_that_overlap_are_hidden():
+    seat = trimesh.creation.box((1, 1, 0.1))
+    leg = trimesh.creation.box(
+        (0.1, 0.1, 1), trimesh.transformations.translation_matrix([0, 0, -0.5])
+    )
+    both = trimesh.util.concatenate([seat, leg])
+    hidden = hidden_faces(np.asarray(both.vertices), np.asarray(both.faces))
+    assert hidden.sum() == 2 and both.face_normals[hidden][:, 2].min() > 0.9
+
+
+def test_loose_triangles_are_no_surface():
+    vertices = np.random.default_rng(0).random((60_000, 3))
+    with pytest.raises(DataError, match="20000 of its 20000 triangles touch no other"):
+        repaired_skin(vertices, np.arange(60_000).reshape(-1, 3))
