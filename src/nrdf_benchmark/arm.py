@@ -100,7 +100,7 @@ def measure(reports: dict[str, dict[str, Any]]) -> list[ArmMetric]:
                lambda r: 100.0 * (r["total"]["force_within"] or 0.0), -95.0),
         metric("coverage lost of the plan, worst region, %", "at most 3",
                lambda r: lost(r, "planned"), 3.0),
-        metric("coverage lost of what is driven, worst region, %", "at most 3",
+        metric("coverage lost of what is executed, worst region, %", "at most 3",
                lambda r: lost(r, "executed"), 3.0),
         metric("times faster than real time", "at least 10",
                lambda r: r["speed"]["times_real_time"], -10.0),

@@ -46,7 +46,7 @@ def test_figures_are_the_worst_regions_and_say_whether_they_meet_the_bar():
     # Shares of what was planned: what a region has left out makes no loss smaller.
     lost = 100 * (1 - 0.94 / 0.99), 100 * (1 - 0.98 / 0.99)
     assert of_plan.values == pytest.approx(lost) and of_plan.met == (False, True)
-    of_driven = found["coverage lost of what is driven, worst region, %"]
+    of_driven = found["coverage lost of what is executed, worst region, %"]
     assert of_driven.values == pytest.approx((100 * (1 - 0.94 / 0.95), 0.0))
     assert of_driven.met == (True, True)
     assert all(
