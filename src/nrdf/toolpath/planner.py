@@ -69,7 +69,7 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
         surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
     )
     contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
-    return add_approach_retract(_tool_segments(contacts, normals, strategy), normals, strategy)
+    return add_approach_retract(tool_segments(contacts, normals, strategy), normals, strategy)
 
 
 def add_approach_retract(
@@ -102,7 +102,7 @@ def add_approach_retract(
     return tuple(segments)
 
 
-def _tool_segments(
+def tool_segments(
     contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
 ) -> list[Segment]:
     """Process segments of a tool along lines on the surface."""

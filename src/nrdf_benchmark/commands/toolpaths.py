@@ -1,20 +1,28 @@
-"""`nrdf eval toolpaths`: rasters planned on known regions."""
+"""`nrdf eval toolpaths`: tool paths planned on known regions, and on real meshes."""
 
 from __future__ import annotations
 
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Literal
 
-from nrdf.commands.console import console, progress_bar, show, table
-from nrdf.commands.options import Folder
-from nrdf.io.bounds import NonNegative, NonNegativeCount
+from nrdf.commands.console import command_line, console, progress_bar, show, table, versions
+from nrdf.commands.options import Folder, Metavar
+from nrdf.commands.output_lock import lock_output
+from nrdf.io.bounds import Count, NonNegative, NonNegativeCount
 
 
+@lock_output("out")
 def toolpaths(
-    category: Literal["chair", "car", "plane", "table"],
+    category: Literal["chair", "car", "plane", "table"] | None = None,
     data: Folder | None = None,
     members: NonNegativeCount = 10,
     trajectory: Literal["raster", "cross-hatch", "spiral", "contour"] = "raster",
     edge_margin_mm: NonNegative = 0.0,
+    meshes: tuple[Annotated[Path, Metavar("FOLDER")], ...] = (),
+    planner: str = "points",
+    sample: Count | None = None,
+    out: Folder | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Tool paths planned on known regions, measured.
 
@@ -22,15 +30,33 @@ def toolpaths(
     no training set holds and, with --data, of the Benchmark for Surface Region Correspondence.
     Apart from all regions, those that the tool's footprint fits into.
 
+    With --meshes, on real meshes instead, and every figure is measured on the mesh that was given,
+    beside the bar that it is held to. A folder with labels.json holds labelled furniture, scaled to
+    0.9 m; one named car holds cars of 4.5 m, on whose bonnet, roof and door is planned; any other
+    mesh is one region, of 1.05 m. Interrupted, the same command goes on. docs/evidence/toolpaths.md
+    defines the figures.
+
     Example: nrdf eval toolpaths --category chair --data bsrc/
 
     Args:
-        category: chair, car, plane or table.
+        category: chair, car, plane or table; or give --meshes.
         data: BSRC's folder, with Chair, Car and plane in it.
         members: Members of the parametric family.
         trajectory: raster, cross-hatch, spiral or contour.
-        edge_margin_mm: Margin along the regions' borders.
+        edge_margin_mm: Margin along the regions' borders; not for --meshes.
+        meshes: Folders of meshes, or mesh files.
+        planner: "points", which transfer uses, or a planner's name in nrdf.toolpath.planners.
+        sample: Only so many meshes of each folder, evenly chosen.
+        out: Folder for the results on meshes: tables, and a row a region as CSV and JSON.
+        overwrite: Start anew, whatever is in the folder.
     """
+    if meshes:
+        _on_meshes(meshes, planner, sample, trajectory, out, overwrite)
+        return
+    if category is None:
+        from nrdf.errors import DataError
+
+        raise DataError("give --category chair, car, plane or table, or --meshes FOLDER")
     from dataclasses import replace
 
     import numpy as np
@@ -63,3 +89,44 @@ def toolpaths(
             show(shown)
         seconds = 8.0 * float(np.mean([r.seconds for r in results]))
         console.print(f"planning takes {seconds:.2f} s of CPU time for 8 regions")
+
+
+def _on_meshes(
+    meshes: tuple[Path, ...],
+    planner: str,
+    sample: int | None,
+    trajectory: str,
+    out: Path | None,
+    overwrite: bool,
+) -> None:
+    from nrdf_benchmark.mesh_paths.evaluate import evaluate_mesh_paths
+    from nrdf_benchmark.mesh_paths.table import (
+        HEADINGS,
+        mesh_rows,
+        selections,
+        totals,
+        write_results,
+    )
+    from nrdf_benchmark.mesh_paths.targets import target_sources
+    from nrdf_benchmark.result_cache import LineCache
+
+    sources = target_sources(meshes, sample)
+    cache = None if out is None else LineCache(out, overwrite)
+    with progress_bar(f"meshes, {planner}") as progress:
+        results = evaluate_mesh_paths(sources, planner, cache, progress, trajectory)
+    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}"
+    for what, chosen in selections(results):
+        shown = table(f"\n{title}: {what}, {len(chosen)}", "", *HEADINGS)
+        for row in mesh_rows(chosen):
+            shown.add_row(row.name, *row.cells)
+        show(shown)
+    console.print(totals(results))
+    for result in results:
+        if result.error:
+            console.print(f"{result.target}, {result.region}: no path: {result.error}")
+    if out is not None:
+        from nrdf.training.provenance import git_commit
+
+        origin = {"command": command_line(), "versions": versions(), "commit": git_commit()}
+        written = write_results(out, results, title, origin)
+        console.print("wrote " + ", ".join(str(path) for path in written))

@@ -1,0 +1,175 @@
+"""Plan on every region of real meshes with one planner, and measure; goes on where it was cut."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import igl
+import numpy as np
+
+from nrdf.errors import DataError, NrdfError, unknown_name
+from nrdf.field.cloud_encoder import WORKING_POINTS
+from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.sampling import downsample, indices_in_subset
+from nrdf.surface.surface import Surface
+from nrdf.toolpath.planner import add_approach_retract, plan, tool_segments
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.types import Segment
+from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
+from nrdf_benchmark.mesh_paths.targets import MeshTarget, TargetSource
+from nrdf_benchmark.result_cache import LineCache, code_checksum
+
+TODAY = "points"
+"""The planner on at most 16,384 points of the surface, which `nrdf transfer` uses."""
+SOURCES = (
+    "nrdf/geometry", "nrdf/surface", "nrdf/toolpath", "nrdf_benchmark/mesh_paths",
+    "nrdf_benchmark/objects/dataset.py",
+)  # fmt: skip
+"""Code that results depend on."""
+
+
+@dataclass(frozen=True)
+class MeshPathResult:
+    """One planner on one region. seconds: CPU time; metrics: None where there is no path, for the
+    reason in `error`."""
+
+    planner: str
+    target: str
+    region: str
+    seconds: float
+    metrics: MeshPathMetrics | None
+    error: str = ""
+
+
+RegionPlanner = Callable[[str], tuple[Segment, ...]]
+
+
+def planner_names() -> tuple[str, ...]:
+    """Today's planner, and those of `nrdf.toolpath.planners` that there are."""
+    return (TODAY, *_mesh_planners())
+
+
+def evaluate_mesh_paths(
+    sources: Sequence[TargetSource],
+    planner: str = TODAY,
+    cache: LineCache | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    trajectory: str | None = None,
+) -> list[MeshPathResult]:
+    """Plan and measure on every region; meshes that `cache` has are not planned on again.
+
+    trajectory: of today's planner, "raster" unless given. `progress` is told (done, all). Raises
+    DataError for a planner that there is not, or a mesh that cannot be used.
+    """
+    if planner not in planner_names():
+        raise DataError(unknown_name("planner", planner, planner_names()))
+    marks = {_fingerprint(source, planner, trajectory): source.name for source in sources}
+    file = f"toolpaths-{planner}.jsonl"
+    lines = cache.read(file, marks) if cache else {}
+    results = []
+    for number, (mark, source) in enumerate(zip(marks, sources, strict=True)):
+        found = _parse(lines.get(source.name))
+        if found is None:
+            found = _evaluate(source.read(), planner, trajectory)
+            if cache:
+                cache.append(file, mark, {"results": [asdict(result) for result in found]})
+        results += found
+        if progress is not None:
+            progress(number + 1, len(sources))
+    return results
+
+
+def _evaluate(target: MeshTarget, planner: str, trajectory: str | None) -> list[MeshPathResult]:
+    strategy = target.strategy
+    if trajectory is not None:
+        strategy = replace(strategy, trajectory=trajectory)  # type: ignore[arg-type]
+    start = time.process_time()
+    make = _today(target, strategy) if planner == TODAY else _on_mesh(target, planner, strategy)
+    shared = (time.process_time() - start) / max(len(target.visible_regions), 1)
+    results = []
+    for region in target.visible_regions:
+        metrics, error = None, ""
+        start = time.process_time()
+        try:
+            segments = make(region)
+        except NrdfError as failed:
+            segments, error = (), str(failed)
+        seconds = shared + time.process_time() - start
+        if any(segment.kind == "process" for segment in segments):
+            metrics = measure_mesh_path(target, region, segments, strategy)
+        elif not error:
+            error = "the planner made no process segment"
+        results.append(MeshPathResult(planner, target.name, region, seconds, metrics, error))
+    return results
+
+
+def _today(target: MeshTarget, strategy: Strategy) -> RegionPlanner:
+    """As `nrdf transfer` does: on evenly thinned points of the skin."""
+    skin = target.skin
+    kept = downsample(skin.points, WORKING_POINTS, np.random.default_rng(0))
+    surface = Surface(skin.points[kept], skin.normals[kept])
+
+    def make(region: str) -> tuple[Segment, ...]:
+        chosen = indices_in_subset(kept, target.indices(region), len(skin.points))
+        return plan(surface, chosen, strategy)
+
+    return make
+
+
+def _mesh_planners() -> dict[str, Callable[[Any, Strategy], list[Any]]]:
+    try:
+        return dict(importlib.import_module("nrdf.toolpath.planners").PLANNERS)
+    except ModuleNotFoundError:
+        return {}
+
+
+def _on_mesh(target: MeshTarget, planner: str, strategy: Strategy) -> RegionPlanner:
+    """On the mesh itself: a region is those faces that lie on the region's own."""
+    surface = importlib.import_module("nrdf.surface.target_mesh").TargetMesh.from_mesh(
+        Mesh(target.vertices, target.faces)
+    )
+    region_mesh = importlib.import_module("nrdf.surface.region_mesh").RegionMesh
+    face = _nearest_face(target, surface.vertices[surface.faces].mean(axis=1))
+
+    def make(region: str) -> tuple[Segment, ...]:
+        faces = region_mesh.from_faces(surface, target.regions[region][face])
+        paths = _mesh_planners()[planner](faces, strategy)
+        normals = [path.normals for path in paths]
+        lines = tool_segments([path.contacts for path in paths], normals, strategy)
+        return add_approach_retract(lines, normals, strategy)
+
+    return make
+
+
+def _nearest_face(target: MeshTarget, points: np.ndarray) -> np.ndarray:
+    vertices, faces = np.ascontiguousarray(target.vertices), np.ascontiguousarray(target.faces)
+    tree = igl.AABB()
+    tree.init(vertices, faces)
+    return np.asarray(tree.squared_distance(vertices, faces, np.ascontiguousarray(points))[1])
+
+
+def _fingerprint(source: TargetSource, planner: str, trajectory: str | None) -> str:
+    parts = [source.name, source.checksum, planner, trajectory, code_checksum(SOURCES)]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
+
+
+def _parse(line: dict[str, Any] | None) -> list[MeshPathResult] | None:
+    """A line's results; None for one that is not ours."""
+    try:
+        return [
+            MeshPathResult(
+                **{
+                    **one,
+                    "metrics": one["metrics"] and MeshPathMetrics(**one["metrics"]),
+                }
+            )
+            for one in line["results"]  # type: ignore[index]
+        ]
+    except (TypeError, KeyError):
+        return None

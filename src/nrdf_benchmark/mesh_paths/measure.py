@@ -1,0 +1,212 @@
+"""Figures of a tool path against the mesh that was given, never the surface it was planned on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import igl
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate, step_lengths
+from nrdf.surface.given_surface import MeshSurface
+from nrdf.toolpath.frames import travel_directions
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.types import Segment
+from nrdf_benchmark.mesh_paths.targets import MeshTarget, face_components
+
+_ALIKE = 0.5  # cosine between normals of one side
+_PARALLEL = 0.8  # cosine between the travel of neighbouring lines
+_BESIDE, _SAME = 2.2, 0.2  # stepovers: the farthest neighbour, and the nearest that is another line
+_PARTS = 8  # samples a tool radius
+_LEAST_STEP_M = 1e-4  # that a turn is divided by
+_FITS = 0.8  # share of a disc that lies on a region which the footprint fits into
+_ASKED = 400  # points at which a region is asked for room
+
+
+@dataclass(frozen=True)
+class MeshPathMetrics:
+    """One region's tool path. Lengths in m, angles in rad.
+
+    distance_99_m, distance_worst_m: of contact points from the given triangles. step_worst: largest
+    step inside a stroke, in spacings; steps_above: how many are above 2. turn_worst_rad_m: largest
+    turn of the axis for each m of the way. coverage: share of the region's visible points within
+    the footprint. spacing_even: share of places whose neighbouring lines are 0.85 to 1.15 stepovers
+    apart, and spacing_worst the farthest, in stepovers; None where no line has a neighbour.
+    strokes: process segments; stroke_ratio: median of their length over the region's extent along
+    them; short_strokes: shorter than the tool's radius; needless_strokes: those of them that cover
+    less than 2 % of the region. surface_m, air_m: way on the surface, and off it.
+    fits: whether the footprint fits into the region somewhere. area_m2: of the visible region.
+    """
+
+    distance_99_m: float
+    distance_worst_m: float
+    step_worst: float
+    steps_above: int
+    turn_worst_rad_m: float
+    coverage: float
+    spacing_even: float | None
+    spacing_worst: float | None
+    strokes: int
+    stroke_ratio: float
+    short_strokes: int
+    needless_strokes: int
+    surface_m: float
+    air_m: float
+    fits: bool
+    area_m2: float
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """The figures' names."""
+        return tuple(field.name for field in fields(cls))
+
+
+def measure_mesh_path(
+    target: MeshTarget, region: str, segments: Sequence[Segment], strategy: Strategy
+) -> MeshPathMetrics:
+    """Measure what a planner made of one region; at least one process segment."""
+    work = [segment for segment in segments if segment.kind == "process"]
+    contacts = [s.positions + strategy.standoff_m * s.axes for s in work]
+    axes = [s.axes for s in work]
+    given = MeshSurface(target.vertices, target.faces)
+    distance = given.distance(np.concatenate(contacts), np.concatenate(axes))
+    steps = [step_lengths(line) for line in contacts]
+    every_step = np.concatenate([*steps, np.zeros(1)])
+    turns = [_turns(a) / np.maximum(s, _LEAST_STEP_M) for a, s in zip(axes, steps, strict=True)]
+    lines = [_Line.of(c, a, strategy) for c, a in zip(contacts, axes, strict=True)]
+    indices = target.indices(region)
+    points, normals = target.skin.points[indices], target.skin.normals[indices]
+    covered = [_covered(points, normals, line, strategy.tool_radius_m) for line in lines]
+    lengths = np.array([float(step.sum()) for step in steps])
+    short = lengths < strategy.tool_radius_m
+    shares = np.array([len(one) for one in covered]) / len(points)
+    apart = _line_spacing(lines, strategy.stepover_m) / strategy.stepover_m
+    return MeshPathMetrics(
+        distance_99_m=float(np.quantile(distance, 0.99)),
+        distance_worst_m=float(distance.max()),
+        step_worst=float(every_step.max() / strategy.spacing_m),
+        steps_above=int((every_step > 2.0 * strategy.spacing_m).sum()),
+        turn_worst_rad_m=float(np.concatenate([*turns, np.zeros(1)]).max()),
+        coverage=len(np.unique(np.concatenate(covered))) / len(points),
+        spacing_even=float(((apart >= 0.85) & (apart <= 1.15)).mean()) if len(apart) else None,
+        spacing_worst=float(apart.max()) if len(apart) else None,
+        strokes=len(work),
+        stroke_ratio=float(np.median(lengths / _extents(target, region, contacts))),
+        short_strokes=int(short.sum()),
+        needless_strokes=int((short & (shares < 0.02)).sum()),
+        surface_m=float(lengths.sum()),
+        air_m=_air(segments),
+        fits=footprint_fits(target, region, strategy.tool_radius_m),
+        area_m2=len(points) * target.point_area_m2,
+    )
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A stroke at even steps: points, outward normals and travel (n, 3), and arc length (n,), m."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    travel: np.ndarray
+    along: np.ndarray
+
+    @classmethod
+    def of(cls, contacts: np.ndarray, axes: np.ndarray, strategy: Strategy) -> _Line:
+        along = arc_length(contacts)
+        at = even_arc_lengths(float(along[-1]), strategy.tool_radius_m / _PARTS)
+        points = interpolate(at, along, contacts)
+        normals = -unit_vectors(interpolate(at, along, axes))
+        return cls(points, normals, travel_directions(points), at)
+
+
+def footprint_fits(target: MeshTarget, region: str, radius_m: float) -> bool:
+    """Whether a disc of that radius lies on the region somewhere, for the most part."""
+    indices = target.indices(region)
+    points, normals = target.skin.points[indices], target.skin.normals[indices]
+    wanted = _FITS * np.pi * radius_m**2 / target.point_area_m2
+    asked = np.unique(np.linspace(0, len(points) - 1, _ASKED).astype(int))
+    for k, near in zip(
+        asked, cKDTree(points).query_ball_point(points[asked], radius_m), strict=True
+    ):
+        if (normals[near] @ normals[k] > _ALIKE).sum() >= wanted:
+            return True
+    return False
+
+
+def _covered(points: np.ndarray, normals: np.ndarray, line: _Line, radius_m: float) -> np.ndarray:
+    """Which of points (n, 3) a stroke's footprint passes over: indices (k,)."""
+    away, near = cKDTree(line.points).query(points, 12, distance_upper_bound=radius_m)
+    there = np.isfinite(away)
+    facing = line.normals[np.where(there, near, 0)]
+    alike = np.einsum("nka,na->nk", facing, normals) > _ALIKE
+    return np.flatnonzero((there & alike).any(axis=1))
+
+
+def _line_spacing(lines: Sequence[_Line], stepover_m: float) -> np.ndarray:
+    """Distances (m,), m, along the surface to the next line on each side that has one.
+
+    A chord's arc is told from the normals at its ends. Lines that cross do not count.
+    """
+    points = np.concatenate([line.points for line in lines])
+    normals = np.concatenate([line.normals for line in lines])
+    travel = np.concatenate([line.travel for line in lines])
+    along = np.concatenate([line.along for line in lines])
+    number = np.repeat(np.arange(len(lines)), [len(line.points) for line in lines])
+    tree = cKDTree(points)
+    asked = np.arange(0, len(points), 2)
+    half = 0.75 * max(float(np.median(step_lengths(lines[0].points))), 1e-9)
+    found: list[float] = []
+    for i, near in zip(
+        asked, tree.query_ball_point(points[asked], _BESIDE * stepover_m), strict=True
+    ):
+        k = np.array(near)
+        offset = points[k] - points[i]
+        cosine = normals[k] @ normals[i]
+        own = (number[k] == number[i]) & (np.abs(along[k] - along[i]) < 2.0 * stepover_m)
+        level = np.abs(offset @ travel[i]) < half
+        chosen = ~own & level & (cosine > _ALIKE) & (np.abs(travel[k] @ travel[i]) > _PARALLEL)
+        bend = np.arccos(np.clip(cosine, -1.0, 1.0))
+        length = np.linalg.norm(offset, axis=1) / np.maximum(np.sinc(bend / (2.0 * np.pi)), 0.1)
+        side = offset @ np.cross(normals[i], travel[i])
+        for beside in (side > _SAME * stepover_m, side < -_SAME * stepover_m):
+            if (chosen & beside).any():
+                found.append(float(length[chosen & beside].min()))
+    return np.array(found)
+
+
+def _extents(target: MeshTarget, region: str, contacts: Sequence[np.ndarray]) -> np.ndarray:
+    """How long (s,), m, the piece of the region that each stroke works is, along the stroke."""
+    mask = target.regions[region]
+    chosen = np.flatnonzero(mask)
+    piece = face_components(target.faces, mask)
+    tree = igl.AABB()
+    vertices = np.ascontiguousarray(target.vertices)
+    own = np.ascontiguousarray(target.faces[chosen])
+    tree.init(vertices, own)
+    middles = np.array([line[len(line) // 2] for line in contacts])
+    at = np.atleast_1d(tree.squared_distance(vertices, own, middles)[1])
+    extents = []
+    for line, k in zip(contacts, piece[chosen[at]], strict=True):
+        main = np.linalg.svd(line - line.mean(axis=0), full_matrices=False)[2][0]
+        extents.append(np.ptp(vertices[target.faces[piece == k]].reshape(-1, 3) @ main))
+    return np.maximum(extents, 1e-9)
+
+
+def _turns(axes: np.ndarray) -> np.ndarray:
+    """Angles (n - 1,), rad, between axes (n, 3) that follow each other."""
+    cosine = np.einsum("na,na->n", axes[1:], axes[:-1])
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _air(segments: Sequence[Segment]) -> float:
+    """The way off the surface, m: free segments, and straight from each segment to the next."""
+    free = sum(float(step_lengths(s.positions).sum()) for s in segments if s.kind != "process")
+    gaps = [
+        float(np.linalg.norm(after.positions[0] - before.positions[-1]))
+        for before, after in pairwise(segments)
+    ]
+    return free + sum(gaps)

@@ -1,0 +1,149 @@
+"""Tables of tool paths on real meshes, with the bars beside them; CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.io.atomic import write_atomically
+from nrdf_benchmark.mesh_paths.evaluate import MeshPathResult
+from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics
+
+HEADINGS = ("bar", "met by", "median", "worst")
+STEM = "toolpaths"
+
+
+@dataclass(frozen=True)
+class MeshRow:
+    """A figure of all regions: what it is, the bar, and what HEADINGS say of it, as people read
+    it."""
+
+    name: str
+    cells: tuple[str, str, str, str]
+
+
+@dataclass(frozen=True)
+class _Figure:
+    """A figure of a region. value: None where it has none; least: whether the value must be at
+    least the limit, instead of at most."""
+
+    name: str
+    bar: str
+    limit: float
+    value: Callable[[MeshPathMetrics], float | None]
+    least: bool = False
+
+
+FIGURES = (
+    _Figure("contacts from given mesh, 99 %, mm", "<= 0.1", 0.1, lambda m: 1e3 * m.distance_99_m),
+    _Figure("contacts, worst, mm", "<= 0.5", 0.5, lambda m: 1e3 * m.distance_worst_m),
+    _Figure("largest step, spacings", "<= 2", 2.0 + 1e-6, lambda m: m.step_worst),
+    _Figure(
+        "turn of the axis, degrees a mm", "<= 3", 3.0 + 1e-6,
+        lambda m: float(np.degrees(m.turn_worst_rad_m)) / 1e3,
+    ),
+    _Figure("coverage, %", ">= 99", 99.0, lambda m: 100.0 * m.coverage, True),
+    _Figure(
+        "neighbours 0.85 to 1.15 stepovers, %", ">= 98", 98.0,
+        lambda m: None if m.spacing_even is None else 100.0 * m.spacing_even, True,
+    ),
+    _Figure("widest spacing, stepovers", "<= 1.3", 1.3, lambda m: m.spacing_worst),
+    _Figure("strokes of a region", "", np.inf, lambda m: float(m.strokes)),
+    _Figure("median stroke, region's lengths", ">= 0.6", 0.6, lambda m: m.stroke_ratio, True),
+    _Figure("strokes under the tool's radius", "", np.inf, lambda m: float(m.short_strokes)),
+    _Figure("of them needless", "0", 0.0, lambda m: float(m.needless_strokes)),
+    _Figure("air, m a m on the surface", "<= 0.5", 0.5, lambda m: m.air_m / max(m.surface_m, 1e-9)),
+)  # fmt: skip
+"""What is shown, in the order of the table."""
+
+
+def mesh_rows(results: Sequence[MeshPathResult]) -> list[MeshRow]:
+    """A row for each figure, over all regions that have a path."""
+    planned = [result.metrics for result in results if result.metrics is not None]
+    rows = []
+    for figure in FIGURES:
+        values = np.array([v for m in planned if (v := figure.value(m)) is not None])
+        if not len(values):
+            continue
+        met = values >= figure.limit if figure.least else values <= figure.limit
+        worst = values.min() if figure.least else values.max()
+        share = f"{met.mean():.0%}" if figure.bar else ""
+        cells = (figure.bar, share, _short(np.median(values)), _short(worst))
+        rows.append(MeshRow(figure.name, cells))
+    return rows
+
+
+def totals(results: Sequence[MeshPathResult]) -> str:
+    """One sentence on all regions together."""
+    planned = [result.metrics for result in results if result.metrics is not None]
+    surface = sum(m.surface_m for m in planned)
+    air = sum(m.air_m for m in planned)
+    strokes = sum(m.strokes for m in planned)
+    seconds = sum(result.seconds for result in results)
+    return (
+        f"{len(planned)} of {len(results)} regions planned: {strokes} strokes, {surface:.1f} m on "
+        f"the surface, {air / max(surface, 1e-9):.2f} m of air for each (bar 0.5), "
+        f"{8.0 * seconds / max(len(results), 1):.1f} s of CPU time for 8 regions"
+    )
+
+
+def markdown(results: Sequence[MeshPathResult], title: str) -> str:
+    """The tables, and the regions without a path."""
+    lines = [f"# {title}"]
+    for what, chosen in selections(results):
+        lines += ["", f"## {what}, {len(chosen)}", "", f"| | {' | '.join(HEADINGS)} |"]
+        lines.append("|---" * (len(HEADINGS) + 1) + "|")
+        lines += [f"| {row.name} | {' | '.join(row.cells)} |" for row in mesh_rows(chosen)]
+    lines += ["", totals(results), ""]
+    lines += [f"- {r.target}, {r.region}: no path: {r.error}" for r in results if r.error]
+    return "\n".join(lines) + "\n"
+
+
+def selections(
+    results: Sequence[MeshPathResult],
+) -> list[tuple[str, list[MeshPathResult]]]:
+    """All regions, and those that the tool's footprint fits into."""
+    fitting = [result for result in results if result.metrics is not None and result.metrics.fits]
+    return [("all regions", list(results)), ("those that the footprint fits into", fitting)]
+
+
+def to_csv(results: Sequence[MeshPathResult]) -> str:
+    """A line for each region, in SI units."""
+    text = io.StringIO()
+    names = MeshPathMetrics.names()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["planner", "target", "region", "seconds", *names, "error"])
+    for result in results:
+        values = [None if result.metrics is None else getattr(result.metrics, n) for n in names]
+        row = [result.planner, result.target, result.region, f"{result.seconds:.3f}"]
+        writer.writerow([*row, *values, result.error])
+    return text.getvalue()
+
+
+def write_results(
+    folder: Path, results: Sequence[MeshPathResult], title: str, origin: Mapping[str, Any]
+) -> list[Path]:
+    """The tables as Markdown, the figures as CSV and JSON: the files' paths."""
+    content = {"origin": dict(origin), "results": [asdict(result) for result in results]}
+    texts = {
+        ".md": markdown(results, title),
+        ".csv": to_csv(results),
+        ".json": json.dumps(content, indent=1) + "\n",
+    }
+    written = []
+    for suffix, text in texts.items():
+        path = folder / f"{STEM}{suffix}"
+        write_atomically(path, [text.encode()])
+        written.append(path)
+    return written
+
+
+def _short(value: float) -> str:
+    return f"{value:.4g}" if value < 1000 else f"{value:.0f}"

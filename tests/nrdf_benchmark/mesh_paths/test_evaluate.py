@@ -1,0 +1,78 @@
+"""The evaluation on meshes: planners by name, and going on where it was cut."""
+
+from __future__ import annotations
+
+import sys
+import types
+
+import pytest
+
+from builders.mesh_targets import PLATE, plate_target, rows_on_top
+from nrdf.errors import DataError, ProcessError
+from nrdf_benchmark.mesh_paths import evaluate
+from nrdf_benchmark.mesh_paths.evaluate import TODAY, evaluate_mesh_paths, planner_names
+from nrdf_benchmark.mesh_paths.targets import TargetSource
+from nrdf_benchmark.result_cache import LineCache
+
+
+@pytest.fixture
+def source():
+    return TargetSource("block", "0" * 64, plate_target)
+
+
+@pytest.fixture
+def planned(monkeypatch):
+    """Rows instead of a plan; the regions that were planned on."""
+    asked = []
+
+    def make(target, strategy):
+        return lambda region: asked.append(region) or rows_on_top([-0.05, -0.025, 0.0])
+
+    monkeypatch.setattr(evaluate, "_today", make)
+    return asked
+
+
+def test_a_plate_is_planned_and_measured(source):
+    (result,) = evaluate_mesh_paths([source])
+    assert (result.planner, result.target, result.region) == (TODAY, "block", "top")
+    assert result.metrics.coverage > 0.99 and result.metrics.distance_99_m < 4e-3
+    assert result.seconds > 0.0 and not result.error
+
+
+def test_meshes_that_were_done_are_not_planned_again(source, planned, tmp_path):
+    told = []
+    first = evaluate_mesh_paths([source], cache=LineCache(tmp_path))
+    again = evaluate_mesh_paths(
+        [source], cache=LineCache(tmp_path), progress=lambda *n: told.append(n)
+    )
+    assert planned == ["top"] and again == first and told == [(1, 1)]
+    changed = TargetSource("block", "1" * 64, plate_target)
+    evaluate_mesh_paths([changed], cache=LineCache(tmp_path))
+    assert planned == ["top", "top"]
+
+
+def test_a_region_that_cannot_be_planned_has_its_reason(source, monkeypatch):
+    def make(target, strategy):
+        def fail(region):
+            raise ProcessError("stepover_m is 9")
+
+        return fail
+
+    monkeypatch.setattr(evaluate, "_today", make)
+    (result,) = evaluate_mesh_paths([source])
+    assert result.metrics is None and result.error == "stepover_m is 9"
+
+
+def test_planners_are_told_by_name(source, monkeypatch):
+    with pytest.raises(DataError, match="points"):
+        evaluate_mesh_paths([source], "rastre")
+    module = types.ModuleType("nrdf.toolpath.planners")
+    module.PLANNERS = {"rows": None}
+    monkeypatch.setitem(sys.modules, "nrdf.toolpath.planners", module)
+    assert planner_names() == (TODAY, "rows")
+    monkeypatch.setattr(
+        evaluate, "_on_mesh", lambda target, planner, strategy: lambda _: rows_on_top([0.0])
+    )
+    (result,) = evaluate_mesh_paths([source], "rows")
+    assert result.planner == "rows" and result.metrics.strokes == 1
+    assert PLATE.stepover_m == 0.025
