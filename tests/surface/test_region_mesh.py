@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-import trimesh
 
 from nrdf.errors import ProcessError
-from nrdf.surface.region_mesh import RegionMesh, boundary_loops, edge_components
+from nrdf.surface.region_mesh import RegionMesh, region_mesh
 from nrdf.surface.target_mesh import TargetMesh
 
 
@@ -46,15 +45,57 @@ def test_parts_that_only_a_corner_connects_are_two_with_a_loop_each():
     assert all(len(part.boundary_loops) == 1 for part in parts)
 
 
-def test_a_closed_mesh_has_no_border():
-    sphere = trimesh.creation.icosphere(1)
-    assert boundary_loops(np.asarray(sphere.faces)) == []
-    assert edge_components(np.asarray(sphere.faces)).max() == 0
-
-
 def test_a_region_needs_faces():
     sheet = plate(2)
     with pytest.raises(ProcessError, match="at least one face"):
         RegionMesh.from_faces(sheet, np.zeros(8, bool))
     with pytest.raises(ProcessError, match="is a mask of 8"):
         RegionMesh.from_faces(sheet, np.array([0, 1]))
+
+
+def votes_on(sheet: TargetMesh, belongs, count: int = 4000):
+    """Random points of a sheet, their normals, and membership (n,) by a function of x and y."""
+    points = np.random.default_rng(0).random((count, 3)) * [1.0, 1.0, 0.0]
+    return points, np.tile([0.0, 0.0, 1.0], (count, 1)), belongs(*points[:, :2].T).astype(float)
+
+
+def test_noisy_votes_give_a_disc_with_a_short_border():
+    sheet = plate(3)
+    points, normals, membership = votes_on(sheet, lambda x, y: np.hypot(x - 0.5, y - 0.5) < 0.3)
+    flipped = np.random.default_rng(1).random(len(points)) < 0.08
+    region = region_mesh(
+        sheet, points, normals, np.where(flipped, 1 - membership, membership), 0.05
+    )
+    assert region.area_m2 == pytest.approx(np.pi * 0.09, rel=0.04)
+    assert len(region.boundary_loops) == 1
+    assert region.loop_length(region.boundary_loops[0]) <= 1.1 * 2 * np.pi * 0.3
+    assert np.abs(region.mesh.vertices[:, 2]).max() == 0.0
+
+
+def test_specks_and_holes_of_the_tools_size_go_and_larger_holes_on_request():
+    def belongs(x, y):
+        ring = np.abs(x - 0.4) + np.abs(y - 0.4)
+        big, small = np.hypot(x - 0.3, y - 0.5) < 0.12, np.hypot(x - 0.6, y - 0.3) < 0.04
+        speck = np.hypot(x - 0.9, y - 0.9) < 0.04
+        return (
+            (x > 0.1) & (x < 0.75) & (y > 0.1) & (y < 0.75) & ~big & ~small & (ring < 9)
+        ) | speck
+
+    sheet = plate(3)
+    votes = votes_on(sheet, belongs, 8000)
+    region = region_mesh(sheet, *votes, 0.06)
+    assert len(region.boundary_loops) == 2 and len(region.components()) == 1
+    said = " ".join(region.changes)
+    assert "1 hole filled" in said and "1 speck smaller than the tool removed" in said
+    whole = region_mesh(sheet, *votes, 0.06, fill_holes=True)
+    assert len(whole.boundary_loops) == 1
+    assert whole.area_m2 == pytest.approx(0.65**2, rel=0.03)
+
+
+def test_a_region_smaller_than_the_tool_is_refused():
+    sheet = plate(3)
+    votes = votes_on(sheet, lambda x, y: np.hypot(x - 0.5, y - 0.5) < 0.1)
+    with pytest.raises(ProcessError, match="smaller than the tool's footprint"):
+        region_mesh(sheet, *votes, 0.3)
+    with pytest.raises(ProcessError, match="radius must be above 0"):
+        region_mesh(sheet, *votes, 0.0)

@@ -1,4 +1,4 @@
-"""A region of a target mesh: its own faces, borders and parts."""
+"""A region of a target mesh: its own faces, borders and parts, and how it follows from votes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,17 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.frames import unit_vectors
+from nrdf.surface.mesh_cut import FineMesh
+from nrdf.surface.mesh_edges import boundary_loops, edge_components, opposite_half_edges
+from nrdf.surface.region_border import Votes, cut_at_border
 from nrdf.surface.target_mesh import TargetMesh
+
+_ALIKE = 0.5  # least cosine between a hole and the region around it
+_TOUCH, _APART = 1e-5, 1e-5  # longest sides within which parts touch, if they look the same way
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,61 +73,118 @@ class RegionMesh:
         return [RegionMesh(part, self.parent, self.changes) for part in parts]
 
 
-def opposite_half_edges(faces: np.ndarray) -> np.ndarray:
-    """The half-edge (3 f,) that runs back along each half-edge, -1 at a border.
+def region_mesh(
+    target: TargetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    membership: np.ndarray,
+    tool_radius_m: float,
+    fill_holes: bool = False,
+) -> RegionMesh:
+    """The region that votes stand for, with a smooth border, as a tool can work it.
 
-    Half-edge 3 i + k leads from corner k of face i to the next. Where more than two faces meet, or
-    two that are wound differently, there is a border.
+    points: (n, 3), m, of the whole target, with outward normals (n, 3) and membership (n,), 0 to 1.
+    Specks smaller than the tool's footprint are removed and holes smaller than it filled; with
+    fill_holes all holes are. Faces that other parts of the object cover are left out. Raises
+    ProcessError where nothing is left, or for arrays that do not fit each other.
     """
-    tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    count = int(faces.max(initial=0)) + 1
-    key = np.minimum(tail, head) * count + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    start = np.flatnonzero(np.diff(key[order], prepend=-1))
-    pairs = start[np.diff(start, append=len(key)) == 2]
-    one, two = order[pairs], order[pairs + 1]
-    good = tail[one] == head[two]
-    one, two = one[good], two[good]
-    opposite = np.full(len(key), -1)
-    opposite[one], opposite[two] = two, one
-    return opposite
+    if not (np.isfinite(tool_radius_m) and tool_radius_m > 0.0):
+        raise ProcessError(f"the tool's radius must be above 0 m, not {tool_radius_m:g}")
+    votes = Votes.checked(points, normals, membership)
+    fine, inside = cut_at_border(target, votes, tool_radius_m, fill_holes)
+    footprint = np.pi * tool_radius_m**2
+    changes: list[str] = []
+    inside, filled = _without_holes(target, fine, inside, np.inf if fill_holes else footprint)
+    changes += _said(filled, "hole", "filled")
+    inside, removed = _without_specks(target, fine, inside, footprint)
+    changes += _said(removed, "speck", "smaller than the tool removed")
+    if not inside.any():
+        raise ProcessError(
+            "nothing is left of the region: all its parts are smaller than the tool's footprint of "
+            f"{1e4 * footprint:.3g} cm²; take a smaller tool"
+        )
+    piece = fine.of_faces(inside)
+    return RegionMesh(TargetMesh(piece.vertices, piece.faces), target, tuple(changes))
 
 
-def edge_components(faces: np.ndarray) -> np.ndarray:
-    """Number (f,), from 0, of the part of the mesh that each face belongs to, across edges."""
-    opposite = opposite_half_edges(faces)
-    inner = np.flatnonzero(opposite >= 0)
-    links = (np.ones(len(inner), bool), (inner // 3, opposite[inner] // 3))
-    graph = coo_matrix(links, (len(faces), len(faces)))
-    return np.asarray(connected_components(graph, directed=False)[1])
+def _without_holes(
+    target: TargetMesh, fine: FineMesh, inside: np.ndarray, largest: float
+) -> tuple[np.ndarray, list[float]]:
+    """The region's faces (f,) with holes up to an area (m²) filled, and the areas of those.
+
+    A hole is a part of the rest that only one part of the region surrounds, is smaller than that,
+    and looks the same way.
+    """
+    number = edge_components(fine.faces, inside)
+    areas = fine.areas
+    area = np.bincount(number, areas)
+    weighted = areas[:, None] * target.face_normals[fine.origin]
+    facing = np.stack([np.bincount(number, weighted[:, a]) for a in range(3)], axis=1)
+    of_region = np.zeros(len(area), bool)
+    of_region[number[inside]] = True
+    opposite = opposite_half_edges(fine.faces)
+    half = np.flatnonzero(opposite >= 0)
+    here, there = number[half // 3], number[opposite[half] // 3]
+    meet = ~of_region[here] & of_region[there]
+    pairs = np.unique(np.stack([here[meet], there[meet]], axis=1), axis=0)
+    # Which way the region looks along the border with each part of the rest.
+    along = np.zeros((len(area), 3))
+    np.add.at(along, here[meet], target.face_normals[fine.origin[opposite[half[meet]] // 3]])
+    open_sided = np.zeros(len(area), bool)
+    open_sided[number[np.flatnonzero(opposite < 0) // 3]] = True
+    around = np.bincount(pairs[:, 0], minlength=len(area))
+    alike = np.einsum(
+        "pa,pa->p",
+        unit_vectors(facing),
+        along / np.maximum(np.bincount(here[meet], minlength=len(area)), 1)[:, None],
+    )
+    filled = []
+    for hole, region in pairs:
+        closed = around[hole] == 1 and not open_sided[hole] and alike[hole] > _ALIKE
+        if closed and area[hole] <= min(largest, area[region]):
+            filled.append(int(hole))
+    return inside | np.isin(number, filled), [float(area[hole]) for hole in filled]
 
 
-def boundary_loops(faces: np.ndarray) -> list[np.ndarray]:
-    """Closed loops (n,) of the vertices along a mesh's borders, faces on their left."""
-    opposite = opposite_half_edges(faces)
-    border = np.flatnonzero(opposite < 0)
-    if not len(border):
+def _without_specks(
+    target: TargetMesh, fine: FineMesh, inside: np.ndarray, footprint: float
+) -> tuple[np.ndarray, list[float]]:
+    """The region's faces (f,) without parts smaller than a footprint (m²), and their areas.
+
+    Parts that touch, facing the same way, count as one: not all meshes are sewn together.
+    """
+    chosen = np.flatnonzero(inside)
+    number = edge_components(fine.faces[chosen])
+    areas = fine.areas[chosen]
+    group = _touching(target, fine, chosen, number)
+    area = np.bincount(group, areas)
+    small = area < footprint
+    kept = inside.copy()
+    kept[chosen[small[group]]] = False
+    return kept, [float(a) for a in area[small]]
+
+
+def _touching(
+    target: TargetMesh, fine: FineMesh, chosen: np.ndarray, number: np.ndarray
+) -> np.ndarray:
+    """Group (f,) of each chosen face: its part, with the parts of its side that it touches."""
+    count = int(number.max(initial=-1)) + 1
+    corner = fine.faces[chosen].reshape(-1)
+    place = np.hstack(
+        [
+            fine.vertices[corner],
+            _APART * target.size * np.repeat(target.face_normals[fine.origin[chosen]], 3, axis=0),
+        ]
+    )
+    tree = cKDTree(place)
+    pairs = tree.query_pairs(_TOUCH * target.size, output_type="ndarray")
+    one, two = (np.repeat(number, 3)[pairs[:, k]] for k in (0, 1))
+    links = coo_matrix((np.ones(len(one), bool), (one, two)), (count, count))
+    return np.asarray(connected_components(links, directed=False)[1])[number]
+
+
+def _said(areas: list[float], noun: str, done: str) -> list[str]:
+    if not areas:
         return []
-
-    def following(half: np.ndarray) -> np.ndarray:
-        return half // 3 * 3 + (half + 1) % 3
-
-    # The next half-edge of the border: turn about the head, through the faces around it.
-    found = following(border)
-    while len(inner := np.flatnonzero(opposite[found] >= 0)):
-        found[inner] = following(opposite[found[inner]])
-    place = np.full(len(opposite), -1)
-    place[border] = np.arange(len(border))
-    after = place[found].tolist()
-    tail = faces.reshape(-1)[border]
-    loops, seen = [], [False] * len(border)
-    for first in range(len(border)):
-        loop = []
-        at = first
-        while not seen[at]:
-            seen[at] = True
-            loop.append(at)
-            at = after[at]
-        if loop:
-            loops.append(tail[loop])
-    return loops
+    nouns = noun if len(areas) == 1 else noun + "s"
+    return [f"{len(areas)} {nouns} {done} ({1e4 * sum(areas):.3g} cm²)"]
