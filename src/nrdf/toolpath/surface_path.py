@@ -22,14 +22,16 @@ PlanarPath = np.ndarray
 
 @dataclass(frozen=True)
 class SurfacePath:
-    """A path on the surface: contact points (n, 3), m, and smooth outward normals (n, 3)."""
+    """A path on the surface: contacts (n, 3), m, and smooth outward normals (n, 3), in driving
+    order; closed: a loop, whose last contact is its first."""
 
     contacts: np.ndarray
     normals: np.ndarray
+    closed: bool = False
 
     def reversed(self) -> SurfacePath:
         """The same path from its end to its start."""
-        return SurfacePath(self.contacts[::-1], self.normals[::-1])
+        return SurfacePath(self.contacts[::-1], self.normals[::-1], self.closed)
 
 
 def place_on_surface(

@@ -1,0 +1,55 @@
+"""Contour and edge: lines at even distances from a region's border, and along it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.planners.distance import distance_from
+from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
+from nrdf.toolpath.planners.level_lines import MeshLine, level_lines
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.surface_path import SurfacePath
+
+_ON_EDGE = 1e-3  # of the stepover: an edge path without margin runs that far inside, on triangles
+
+
+def plan_contour(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
+    """Closed rings at even distances from the border, the holes' too, from the outside in.
+
+    A part without a border has its rings around its end. Raises ProcessError for a margin that
+    leaves nothing.
+    """
+    found = []
+    for part in parts_of(region, strategy):
+        found += driven(region, part, ring_lines(part, strategy), strategy)
+    return checked(found, strategy)
+
+
+def plan_edge(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
+    """One loop along the outer border and one around every hole, `edge_margin_m` inside.
+
+    Raises ProcessError for a margin that leaves nothing, as where there is no border.
+    """
+    found = []
+    for part in parts_of(region, strategy):
+        distance = part.border_distance
+        if distance is not None:
+            at = max(strategy.edge_margin_m, _ON_EDGE * strategy.stepover_m)
+            found += driven(
+                region, part, level_lines(part.mesh, distance, np.array([at])), strategy
+            )
+    return checked(found, strategy)
+
+
+def ring_distance(part: Part) -> np.ndarray:
+    """Distance (v,) from a part's border, or from one end where it has none, m."""
+    if part.border_distance is not None:
+        return part.border_distance
+    height = (part.mesh.vertices - part.centre) @ part.axes[0]
+    return distance_from(part.mesh, np.array([int(np.argmin(height))]))
+
+
+def ring_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
+    """Level lines of the distance from the border, a stepover apart."""
+    return lines_at(part, ring_distance(part), strategy)

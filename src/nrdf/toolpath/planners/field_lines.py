@@ -1,0 +1,134 @@
+"""What planners share: a region's parts in fine triangles, and level lines of them as paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.geometry.polylines import total_length
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.planners.distance import distance_from
+from nrdf.toolpath.planners.fine_mesh import FineMesh, refine
+from nrdf.toolpath.planners.level_lines import MeshLine, cut_where, level_lines, resampled
+from nrdf.toolpath.planners.ordering import snake_order
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.surface_path import SurfacePath
+
+_EDGE, _OPEN = 0.45, 0.3
+_SPECK = 0.05
+"""Share of the footprint's area that a part must have to get a line."""
+_LEAST_SPACING = 0.9
+_SPIKE = 0.001  # of the area: how far out the outermost tips of a part do not count
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a region that hangs together, in fine triangles."""
+
+    mesh: FineMesh
+
+    @cached_property
+    def border_distance(self) -> np.ndarray | None:
+        """Distance (v,) along the surface from the part's border, m; None where it has none."""
+        border = self.mesh.border
+        return distance_from(self.mesh, border) if len(border) else None
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """Centre (3,) of its area, m."""
+        return np.asarray(np.average(self.mesh.centres, axis=0, weights=self.mesh.areas))
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """Principal axes (3, 3), rows, the longest first."""
+        away = self.mesh.centres - self.centre
+        return np.asarray(np.linalg.eigh((away * self.mesh.areas[:, None]).T @ away)[1].T[::-1])
+
+    @cached_property
+    def outward(self) -> np.ndarray | None:
+        """Mean normal (3,), unit; None where the part closes around itself."""
+        mean = np.average(self.mesh.normals, axis=0, weights=self.mesh.areas)
+        length = float(np.linalg.norm(mean))
+        return mean / length if length > _OPEN else None
+
+    def inside(self, lines: Sequence[MeshLine], margin_m: float) -> list[MeshLine]:
+        """Lines as far as they keep a margin from the border."""
+        distance = self.border_distance if margin_m > 0.0 else None
+        if distance is None:
+            return list(lines)
+        return [
+            part for line in lines for part in cut_where(line, line.values(distance) - margin_m)
+        ]
+
+
+def parts_of(region: RegionMesh, strategy: Strategy) -> list[Part]:
+    """The parts of a region that are worth a line, the largest first, refined for the stepover."""
+    fine = refine(region.mesh.vertices, region.mesh.faces, _EDGE * strategy.stepover_m)
+    meshes = fine.components()
+    least = _SPECK * np.pi * strategy.tool_radius_m**2
+    return [Part(m) for m in meshes if float(m.areas.sum()) >= least] or [Part(meshes[0])]
+
+
+def even_levels(values: np.ndarray, weights: np.ndarray, stepover_m: float) -> np.ndarray:
+    """Levels (k,) of a distance (n,) for lines one stepover apart, or up to a tenth less.
+
+    The outermost lines are half a stepover from the ends at most. weights: (n,), areas.
+    """
+    order = np.argsort(values)
+    share = np.cumsum(weights[order]) / float(weights.sum())
+    low, high = np.interp([_SPIKE, 1.0 - _SPIKE], share, values[order])
+    width = float(high - low)
+    count = max(int(np.ceil(width / stepover_m - 0.02)), 1)
+    apart = max(width / count, _LEAST_SPACING * stepover_m)
+    return 0.5 * (low + high) + apart * (np.arange(count) - 0.5 * (count - 1))
+
+
+def driven(
+    region: RegionMesh, part: Part, lines: Sequence[MeshLine], strategy: Strategy
+) -> list[SurfacePath]:
+    """Level lines as paths in snake order, their contacts evenly spaced on the region's triangles.
+
+    Pieces shorter than the tool's radius are left out where longer lines are.
+    """
+    length = np.array([total_length(line.points) for line in lines])
+    least = min(strategy.tool_radius_m, float(length.max(initial=0.0)))
+    kept = [line for line, way in zip(lines, length, strict=True) if way >= least > 0.0]
+    if not kept:
+        return []
+    placed = [resampled(line, strategy.spacing_m) for line in kept]
+    contacts = np.concatenate([points for points, _ in placed])
+    faces = part.mesh.origin[np.concatenate([face for _, face in placed])]
+    normals = region.mesh.smooth_normals(contacts, faces, strategy.tool_radius_m)
+    cuts = np.cumsum([len(points) for points, _ in placed])[:-1]
+    paths = [
+        SurfacePath(points, outward, line.closed)
+        for line, points, outward in zip(
+            kept, np.split(contacts, cuts), np.split(normals, cuts), strict=True
+        )
+    ]
+    return snake_order(paths, [line.level for line in kept], strategy.stepover_m)
+
+
+def lines_at(part: Part, values: np.ndarray, strategy: Strategy) -> list[MeshLine]:
+    """Lines of a distance (v,) across a part, one stepover apart, inside the margin."""
+    weight, margin = part.mesh.mass, strategy.edge_margin_m
+    if margin > 0.0 and part.border_distance is not None:
+        weight = weight * (part.border_distance > margin)
+    if not weight.any():
+        return []
+    levels = even_levels(values, weight, strategy.stepover_m)
+    return part.inside(level_lines(part.mesh, values, levels), margin)
+
+
+def checked(paths: list[SurfacePath], strategy: Strategy) -> list[SurfacePath]:
+    """The paths. Raises ProcessError where there are none."""
+    if not paths:
+        raise ProcessError(
+            f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region; "
+            "give less"
+        )
+    return paths

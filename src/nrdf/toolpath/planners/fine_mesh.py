@@ -1,0 +1,259 @@
+"""A region's mesh refined for planning: the same surface, in triangles that are small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+MOST_FACES = 50_000
+"""Faces of a refined mesh, about; larger regions are planned in larger triangles."""
+_ROUNDS, _FLIPS = 24, 3
+_FLAT = 3e-7  # of the mesh's extent: two triangles that lie so flat are one face, cut anyhow
+
+
+@dataclass(frozen=True)
+class FineMesh:
+    """A surface cut into small triangles: every one lies within one of the surface it came from.
+
+    vertices: (v, 3), m; faces: (f, 3); origin: (f,) the face that each came from; edge_m: no edge
+    is longer.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    origin: np.ndarray
+    edge_m: float
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Areas (f,) of the faces, m²."""
+        return 0.5 * np.linalg.norm(self._crossed, axis=1)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals (f, 3) of the faces."""
+        length = np.linalg.norm(self._crossed, axis=1, keepdims=True)
+        return self._crossed / np.maximum(length, 1e-300)
+
+    @cached_property
+    def centres(self) -> np.ndarray:
+        """Centres (f, 3) of the faces, m."""
+        return np.asarray(self.vertices[self.faces].mean(axis=1))
+
+    @cached_property
+    def edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Edges (e, 2) of two vertices, and the edges (f, 3) of each face, from each corner on."""
+        return _edges(self.faces)
+
+    @cached_property
+    def border(self) -> np.ndarray:
+        """Vertices (b,) on edges of a single face."""
+        pairs, of_face = self.edges
+        return np.unique(pairs[np.bincount(of_face.ravel(), minlength=len(pairs)) == 1])
+
+    @cached_property
+    def stiffness(self) -> csc_matrix:
+        """Cotangent matrix (v, v), positive semi-definite, as `gradient` has it."""
+        weight = csr_matrix((np.repeat(self.areas, 3), (np.arange(3 * len(self.faces)),) * 2))
+        return csc_matrix(self.gradient.T @ weight @ self.gradient)
+
+    @cached_property
+    def mass(self) -> np.ndarray:
+        """Area (v,) of each vertex, m²."""
+        return np.bincount(
+            self.faces.ravel(), np.repeat(self.areas / 3.0, 3), minlength=len(self.vertices)
+        )
+
+    @cached_property
+    def gradient(self) -> csr_matrix:
+        """Matrix (3 f, v) from values at the vertices to their gradient, 3 rows a face."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        double = np.maximum(2.0 * self.areas, 1e-300)[:, None]
+        turned = [np.cross(self.normals, side) / double for side in (c - b, a - c, b - a)]
+        rows = np.repeat(np.arange(3 * len(self.faces)).reshape(-1, 3), 3, axis=0)
+        columns = np.repeat(self.faces.ravel(), 3).reshape(-1, 3)
+        values = np.stack(turned, axis=1).reshape(-1, 3)
+        shape = (3 * len(self.faces), len(self.vertices))
+        return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
+
+    def slopes(self, values: np.ndarray) -> np.ndarray:
+        """Gradients (f, 3) of values (v,) at the vertices."""
+        return np.asarray(self.gradient @ values).reshape(-1, 3)
+
+    def divergence(self, field: np.ndarray) -> np.ndarray:
+        """Integrated divergence (v,) of a vector (f, 3) a face: the right side of Poisson's
+        equation for `stiffness`."""
+        return np.asarray(self.gradient.T @ (self.areas[:, None] * field).ravel())
+
+    def components(self) -> list[FineMesh]:
+        """The parts that hang together, largest first."""
+        pairs, _ = self.edges
+        count = len(self.vertices)
+        linked = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count))
+        number, label = connected_components(linked, directed=False)
+        if number == 1:
+            return [self]
+        of_face = label[self.faces[:, 0]]
+        area = np.bincount(of_face, self.areas, minlength=number)
+        order = np.argsort(-area, kind="stable")
+        return [self.part(of_face == k) for k in order if area[k] > 0.0]
+
+    def part(self, kept: np.ndarray) -> FineMesh:
+        """The faces that are kept (f,) bool."""
+        used, faces = np.unique(self.faces[kept], return_inverse=True)
+        return FineMesh(self.vertices[used], faces.reshape(-1, 3), self.origin[kept], self.edge_m)
+
+    @cached_property
+    def _crossed(self) -> np.ndarray:
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return np.cross(b - a, c - a)
+
+
+def refine(vertices: np.ndarray, faces: np.ndarray, edge_m: float) -> FineMesh:
+    """Split the edges of a mesh (v, 3), (f, 3) until none is much longer than `edge_m`.
+
+    Where that would be too many triangles (`MOST_FACES`), the edge is as much longer as needed.
+    Thin triangles are cut across only, and flat neighbours share the best of their two diagonals.
+    """
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    edge_m = max(edge_m, float(np.sqrt(area / (0.4 * MOST_FACES))))
+    origin = np.arange(len(faces))
+    for _ in range(_ROUNDS):
+        pairs, of_face = _edges(faces)
+        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+        long = length > edge_m
+        if not long.any():
+            break
+        inner = _Inner.of(vertices, faces, pairs, of_face)
+        thin = inner.flat & (inner.height < 0.5 * edge_m)
+        long[inner.edge[thin]] = False
+        if not long.any():
+            break
+        middle = np.full(len(pairs), -1)
+        middle[long] = len(vertices) + np.arange(int(long.sum()))
+        added = 0.5 * (vertices[pairs[long, 0]] + vertices[pairs[long, 1]])
+        vertices = np.concatenate([vertices, added])
+        faces, source = _split(faces, middle[of_face], vertices)
+        origin = origin[source]
+        for _ in range(_FLIPS):
+            faces, changed = _flipped(vertices, faces)
+            if changed <= 0.01 * len(faces):
+                break
+    return FineMesh(vertices, faces, origin, edge_m)
+
+
+def _split(
+    faces: np.ndarray, middle: np.ndarray, vertices: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Faces (f, 3) with new vertices (f, 3) on their edges, -1 where none; and their sources."""
+    cut = middle >= 0
+    count = cut.sum(axis=1)
+    whole = np.flatnonzero(count == 0)
+    made, source = [faces[whole]], [whole]
+
+    def add(index: np.ndarray, *corners: np.ndarray) -> None:
+        made.append(np.stack(corners, axis=1))
+        source.append(index)
+
+    def turned(index: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, ...]:
+        columns = (first[:, None] + np.arange(3)) % 3
+        rows = index[:, None]
+        return (*faces[rows, columns].T, *middle[rows, columns].T)
+
+    index = np.flatnonzero(count == 1)
+    a, b, c, ab, _, _ = turned(index, cut[index].argmax(axis=1))
+    add(index, a, ab, c)
+    add(index, ab, b, c)
+    index = np.flatnonzero(count == 2)
+    # The edge that stays whole is the last one, from c to a.
+    a, b, c, ab, bc, _ = turned(index, ((~cut[index]).argmax(axis=1) + 1) % 3)
+    add(index, ab, b, bc)
+    one = np.linalg.norm(vertices[a] - vertices[bc], axis=1)
+    other = np.linalg.norm(vertices[c] - vertices[ab], axis=1)
+    near = one <= other
+    add(index, a, ab, np.where(near, bc, c))
+    add(index, np.where(near, a, ab), bc, c)
+    index = np.flatnonzero(count == 3)
+    a, b, c, ab, bc, ca = turned(index, np.zeros(len(index), int))
+    for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)):
+        add(index, *corners)
+    return np.concatenate(made), np.concatenate(source)
+
+
+@dataclass(frozen=True)
+class _Inner:
+    """Edges (n,) between two faces f, g: a, b on the edge, c, d across; whether they lie flat, and
+    the larger height of the two triangles on the edge."""
+
+    edge: np.ndarray
+    faces: np.ndarray
+    corners: np.ndarray
+    flat: np.ndarray
+    height: np.ndarray
+
+    @staticmethod
+    def of(
+        vertices: np.ndarray, faces: np.ndarray, pairs: np.ndarray, of_face: np.ndarray
+    ) -> _Inner:
+        sides = of_face.ravel()
+        order = np.argsort(sides, kind="stable")
+        count = np.bincount(sides, minlength=len(pairs))
+        first = np.cumsum(count) - count
+        inner = np.flatnonzero(count == 2)
+        one, other = order[first[inner]], order[first[inner] + 1]
+        f, g = one // 3, other // 3
+        a, b, c = (faces[f, (one + k) % 3] for k in range(3))
+        d = faces[g, (other + 2) % 3]
+        pa, pb, pc, pd = (vertices[corner] for corner in (a, b, c, d))
+        side = pb - pa
+        normal, beside = np.cross(side, pc - pa), np.cross(pd - pa, side)
+        size, other_size = np.linalg.norm(normal, axis=1), np.linalg.norm(beside, axis=1)
+        limit = _FLAT * float(np.ptp(vertices, axis=0).max())
+        off = np.abs(np.einsum("ea,ea->e", normal, pd - pa)) / np.maximum(size, 1e-300)
+        flat = (faces[g, other % 3] == b) & (off < limit) & (c != d)
+        flat &= np.einsum("ea,ea->e", normal, beside) > 0.0
+        height = np.maximum(size, other_size) / np.maximum(np.linalg.norm(side, axis=1), 1e-300)
+        corners = np.stack([a, b, c, d], axis=1)
+        return _Inner(inner, np.stack([f, g], axis=1), corners, flat, height)
+
+
+def _flipped(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, int]:
+    """Faces (f, 3) with edges between flat neighbours turned where that makes them less thin, and
+    how many were: Delaunay's criterion, for edges that share no triangle."""
+    inner = _Inner.of(vertices, faces, *_edges(faces))
+    pa, pb, pc, pd = vertices[inner.corners].transpose(1, 0, 2)
+    wide = _angle(pa - pc, pb - pc) + _angle(pa - pd, pb - pd)
+    chosen = np.flatnonzero(inner.flat & (wide > np.pi + 1e-6))
+    if not len(chosen):
+        return faces, 0
+    # Each takes its two faces, the widest first.
+    f, g = inner.faces[chosen].T
+    rank = np.empty(len(chosen), int)
+    rank[np.argsort(-wide[chosen], kind="stable")] = np.arange(len(chosen))
+    taken = np.full(len(faces), len(chosen))
+    np.minimum.at(taken, f, rank)
+    np.minimum.at(taken, g, rank)
+    free = (taken[f] == rank) & (taken[g] == rank)
+    a, b, c, d = inner.corners[chosen[free]].T
+    faces = faces.copy()
+    faces[f[free]] = np.stack([a, d, c], axis=1)
+    faces[g[free]] = np.stack([d, b, c], axis=1)
+    return faces, int(free.sum())
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    crossed = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.arctan2(crossed, np.einsum("ea,ea->e", one, other))
+
+
+def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    pairs = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    pairs = np.sort(pairs, axis=1).astype(np.int64)
+    key = pairs[:, 0] * (int(faces.max(initial=0)) + 1) + pairs[:, 1]
+    _, first, of_face = np.unique(key, return_index=True, return_inverse=True)
+    return pairs[first], of_face.reshape(-1, 3)
