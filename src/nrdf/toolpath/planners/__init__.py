@@ -12,6 +12,8 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.contour import plan_contour, plan_edge
 from nrdf.toolpath.planners.plane_slices import plan_plane_slices
 from nrdf.toolpath.planners.raster import plan_cross_hatch, plan_raster
+from nrdf.toolpath.planners.rod import plan_rod
+from nrdf.toolpath.planners.spiral import plan_spiral
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -22,5 +24,7 @@ PLANNERS: dict[str, Planner] = {
     "plane-slices": plan_plane_slices,
     "cross-hatch": plan_cross_hatch,
     "contour": plan_contour,
+    "spiral": plan_spiral,
     "edge": plan_edge,
+    "rod": plan_rod,
 }

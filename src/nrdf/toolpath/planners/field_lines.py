@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.polylines import total_length
@@ -22,6 +23,8 @@ _EDGE, _OPEN = 0.45, 0.3
 _SPECK = 0.05
 """Share of the footprint's area that a part must have to get a line."""
 _LEAST_SPACING = 0.9
+_PIECE, _NEXT_TO = 8.0, 0.6
+"""Stepovers that a short piece is long, at most, and that it is from longer lines."""
 _SPIKE = 0.001  # of the area: how far out the outermost tips of a part do not count
 
 
@@ -99,6 +102,7 @@ def driven(
     kept = [line for line, way in zip(lines, length, strict=True) if way >= least > 0.0]
     if not kept:
         return []
+    kept = _needed(kept, strategy)
     placed = [resampled(line, strategy.spacing_m) for line in kept]
     contacts = np.concatenate([points for points, _ in placed])
     faces = part.mesh.origin[np.concatenate([face for _, face in placed])]
@@ -111,6 +115,23 @@ def driven(
         )
     ]
     return snake_order(paths, [line.level for line in kept], strategy.stepover_m)
+
+
+def _needed(lines: list[MeshLine], strategy: Strategy) -> list[MeshLine]:
+    """Lines without the short ones that run next to longer ones: ends of lines that meet."""
+    length = np.array([total_length(line.points) for line in lines])
+    short = length < min(_PIECE * strategy.stepover_m, 0.5 * float(length.max()))
+    if not short.any() or short.all():
+        return lines
+    places = [resampled(line, 0.5 * strategy.stepover_m)[0] for line in lines]
+    kept = np.flatnonzero(~short).tolist()
+    tree = cKDTree(np.concatenate([places[k] for k in kept]))
+    for k in sorted(np.flatnonzero(short).tolist(), key=lambda k: -length[k]):
+        away = tree.query(places[k])[0]
+        if (away > _NEXT_TO * strategy.stepover_m).mean() > 0.1:
+            kept.append(k)
+            tree = cKDTree(np.concatenate([places[j] for j in kept]))
+    return [lines[k] for k in sorted(kept)]
 
 
 def lines_at(part: Part, values: np.ndarray, strategy: Strategy) -> list[MeshLine]:

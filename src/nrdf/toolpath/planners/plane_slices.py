@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from nrdf.geometry.polylines import total_length
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine
-from nrdf.toolpath.planners.raster import across_directions, line_direction
+from nrdf.toolpath.planners.raster import across_directions, line_direction, usual_length
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
+
+_BETTER = 2.0
+"""How much longer the lines of another direction must be to be taken, on a closed part."""
 
 
 def plan_plane_slices(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
@@ -29,12 +29,11 @@ def _sliced(part: Part, strategy: Strategy) -> list[MeshLine]:
     """Lines of one part, in the planes that stand on it, or along it where it closes around."""
     along = line_direction(part, strategy.direction)
     best: list[MeshLine] = []
-    longest = -1.0
+    longest = 0.0
     for across in across_directions(part, along):
         lines = lines_at(part, part.mesh.vertices @ across, strategy)
-        usual = float(np.median([total_length(line.points) for line in lines])) if lines else 0.0
+        usual = usual_length(lines)
 
-        # The first direction is the likeliest: another must be clearly better.
-        if usual > (2.0 if best else 1.0) * longest:
+        if usual > _BETTER * longest:
             best, longest = lines, usual
     return best

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.polylines import total_length
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.toolpath.planners.distance import distance_across
+from nrdf.toolpath.planners.distance import distance_across, even_share, signed_distance
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine
 from nrdf.toolpath.strategy import Strategy
@@ -18,7 +19,7 @@ from nrdf.toolpath.surface_path import SurfacePath
 
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length along a region gives no direction there."""
-_WHOLE, _BETTER = 0.9, 1.3
+_WHOLE, _BETTER = 0.9, 1.2
 # Lines mostly shorter than that share of a part may run across what should be followed: the other
 # way is taken where its lines are that much longer.
 
@@ -52,16 +53,29 @@ def raster_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
     """The lines of one part: of equal distance from its middle line."""
     along = line_direction(part, strategy.direction)
     best: list[MeshLine] = []
-    longest = -1.0
+    most = -1.0
     extent = float(np.ptp(part.mesh.vertices @ along))
     for across in across_directions(part, along):
-        lines = lines_at(part, _across(part, across), strategy)
-        usual = float(np.median([total_length(line.points) for line in lines])) if lines else 0.0
-        if usual > _BETTER * longest:
-            best, longest = lines, usual
-        if usual >= _WHOLE * extent:
-            break
+        height = _height(part, across)
+        # Around a closed part the plane's lines are followed, around bends as well.
+        ways = (
+            (distance_across,) if part.outward is not None else (signed_distance, distance_across)
+        )
+        for way in ways:
+            distance = way(part.mesh, height)
+            lines = lines_at(part, distance, strategy)
+            value = usual_length(lines) * even_share(part.mesh, distance)
+            if value > _BETTER * most:
+                best, most = lines, value
+            if value >= _WHOLE * extent:
+                return best
     return best
+
+
+def usual_length(lines: Sequence[MeshLine]) -> float:
+    """Mean length of the line that a place of the lines is on, m: short pieces count little."""
+    length = np.array([total_length(line.points) for line in lines])
+    return float((length**2).sum() / max(float(length.sum()), 1e-300))
 
 
 def line_direction(part: Part, direction: np.ndarray | None) -> np.ndarray:
@@ -98,10 +112,9 @@ def across_directions(part: Part, along: np.ndarray) -> list[np.ndarray]:
     return [axes[:, 2], axes[:, 1]]
 
 
-def _across(part: Part, across: np.ndarray) -> np.ndarray:
-    """Signed distance (v,) along the surface from the plane through a part's middle, m."""
+def _height(part: Part, across: np.ndarray) -> np.ndarray:
+    """Signed height (v,) over the plane that halves a part's area, m."""
     height = part.mesh.vertices @ across
     order = np.argsort(height)
     share = np.cumsum(part.mesh.mass[order])
-    middle = float(np.interp(0.5 * share[-1], share, height[order]))
-    return distance_across(part.mesh, height - middle)
+    return np.asarray(height - np.interp(0.5 * share[-1], share, height[order]))
