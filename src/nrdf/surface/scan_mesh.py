@@ -20,8 +20,8 @@ _FITTED = 36  # points that a quadric is fitted to
 _NEAREST = 8  # fitted points that the distance at a place comes from
 _ALIKE, _AGAINST = 0.3, -0.3  # cosines between normals of one side, and of two
 _BAND = 1  # cells around each point that the surface is looked for in
-_GAP = 1.3  # spacings from the nearest point that a face may be
-_PAST, _PEELS = 0.6, 3  # the same at the surface's end, and rings of faces taken away to get there
+_GAP = 1.8  # spacings from the nearest point that a face may be
+_PAST, _PEELS = 0.6, 4  # the same at the surface's end, and rings of faces taken away to get there
 _LEAST_FACES = 24  # of a piece: smaller ones are noise
 _AT_ONCE = 1 << 15
 _CORNERS = np.array(
@@ -145,7 +145,7 @@ def _zero_surface(
     """Vertices and outward faces where the signed distance to the points' planes is 0."""
     if not len(points):
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    origin = points.min(axis=0) - 4.0 * cell
+    origin = points.min(axis=0) - 4.371 * cell  # flat sides then miss the corners of cells
     around = np.stack(np.meshgrid(*[np.arange(-_BAND, _BAND + 1)] * 3), axis=-1).reshape(-1, 3)
     code = np.array([1 << 42, 1 << 21, 1])
     own = np.unique(np.floor((points - origin) / cell).astype(np.int64) @ code)
