@@ -116,13 +116,14 @@ def _sides(points: np.ndarray, normals: np.ndarray, thickness: float) -> list[np
     """The points in one or two sets of indices, in which no two opposite sides lie so near."""
     tree = cKDTree(points)
     # Half the thickness below a point of a thin sheet, the nearest one is of the other side.
-    near = tree.query(points - thickness / 2.0 * normals)[1]
-    amid = np.einsum("na,na->n", normals[near], normals) < _AGAINST
-    amid &= np.linalg.norm(points[near] - points, axis=1) < thickness
+    near = tree.query(points - thickness / 2.0 * normals, min(4, len(points)))[1]
+    against = np.einsum("nka,na->nk", normals[near], normals) < _AGAINST
+    against &= np.linalg.norm(points[near] - points[:, None], axis=2) < thickness
+    amid = against.any(axis=1)
     if amid.mean() < 1e-4:
         return [np.arange(len(points))]
     # Thin sheets, each with a direction that tells its sides.
-    amid[near[amid]] = True
+    amid[near[against]] = True
     chosen = np.flatnonzero(amid)
     away, near = cKDTree(points[chosen]).query(points[chosen], min(8, len(chosen)))
     row, column = np.nonzero(away < thickness)
@@ -136,6 +137,12 @@ def _sides(points: np.ndarray, normals: np.ndarray, thickness: float) -> list[np
     axis = np.linalg.eigh(scatter)[1][:, :, 2]
     back = np.zeros(len(points), bool)
     back[chosen] = np.einsum("na,na->n", normals[chosen], axis[sheet]) < 0.0
+    # Points that this missed go with those beside them.
+    rest = np.flatnonzero(~amid)
+    placed = np.hstack([points, thickness * normals])
+    off, beside = cKDTree(placed[chosen]).query(placed[rest], distance_upper_bound=thickness / 2.0)
+    found = np.isfinite(off)
+    back[rest[found]] = back[chosen[beside[found]]]
     return [np.flatnonzero(~back), np.flatnonzero(back)]
 
 
