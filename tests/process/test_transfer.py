@@ -178,19 +178,30 @@ def test_regions_that_overlap_on_the_target_are_said(model):
     assert any("regions 'top' and 'right' overlap" in line for line in result.warnings)
 
 
-def test_paths_are_compared_with_the_mesh_that_was_given(model):
-    """Its points lie 5 mm outside of the box: planned on them, all is well."""
-    target = cloud(seed=1)
-    box = trimesh.creation.box(SIZE - 0.01)
+def on_a_box(model, target, inwards):
+    """The top of a target that was sampled from a box, whose sides lie so far inside, m."""
+    box = trimesh.creation.box(SIZE - 2.0 * inwards)
     mesh = Mesh(np.array(box.vertices), np.array(box.faces))
-    (step,) = (
-        ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
-        .transfer(replace(target, mesh=mesh))
-        .paths
-    )
+    transfer = ProcessTransfer(bound_knowledge({"top": [SAND]}), model)
+    (step,) = transfer.transfer(replace(target, mesh=mesh)).paths
+    return step
+
+
+def test_contacts_lie_on_the_mesh_that_was_given(model):
+    """Its points lie 5 mm outside of the box: planned on them, the tool would miss it."""
+    step = on_a_box(model, cloud(seed=1), 5e-3)
+    assert step.metrics.surface_distance_99_m == pytest.approx(5e-3, abs=1e-3)
+    assert step.metrics.true_distance_worst_m < 1e-6
+    assert not [w for w in path_warnings(step.process, step.metrics) if "as given" in w]
+
+
+def test_paths_are_compared_with_the_mesh_that_was_given(model):
+    """The box is out of the tool's reach: the path stays, and it is said how far off it is."""
+    inwards = 3.0 * SAND["tool"]["radius_mm"] / 1000.0
+    step = on_a_box(model, cloud(seed=1), inwards)
     assert step.metrics.compared_with == "the mesh as given (12 triangles)"
     assert step.metrics.surface_distance_99_m < 1e-3
-    assert step.metrics.true_distance_95_m == pytest.approx(5e-3, abs=1e-3)
+    assert step.metrics.true_distance_95_m == pytest.approx(inwards, abs=1e-3)
     assert step.metrics.true_distance_worst_m >= step.metrics.true_distance_95_m
     (warning,) = (w for w in path_warnings(step.process, step.metrics) if "as given" in w)
     assert re.match(r"1 % of the way on the surface is more than \d", warning)

@@ -52,6 +52,8 @@ from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind_check import KindCheck
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
+from nrdf.surface.target_mesh import TargetMesh
+from nrdf.toolpath.mesh_projection import on_mesh, target_mesh_of
 from nrdf.toolpath.metrics import measure_path
 from nrdf.toolpath.planner import add_approach_retract, plan
 from nrdf.toolpath.types import Segment
@@ -142,8 +144,9 @@ class ProcessTransfer:
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
         cloud = with_normals(encoded)
-        given = given_surface(cloud if whole is None else with_normals_of(whole, cloud))
-        paths = self._paths(found, correspondence, given, progress)
+        complete = cloud if whole is None else with_normals_of(whole, cloud)
+        given, mesh = given_surface(complete), target_mesh_of(complete)
+        paths = self._paths(found, correspondence, given, mesh, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [
@@ -209,6 +212,7 @@ class ProcessTransfer:
         found: Mapping[str, FoundRegion],
         correspondence: Correspondence,
         given: GivenSurface,
+        mesh: TargetMesh | None,
         progress: Callable[[int, int], None] | None,
     ) -> tuple[PathResult, ...]:
         """Every process on the target, planned by several threads."""
@@ -216,7 +220,7 @@ class ProcessTransfer:
         steps, paths = self.steps(), []
         with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
             planned = [
-                pool.submit(self._path, *step, found[step[0]], correspondence, given)
+                pool.submit(self._path, *step, found[step[0]], correspondence, given, mesh)
                 for step in steps
             ]
             try:
@@ -237,6 +241,7 @@ class ProcessTransfer:
         found: FoundRegion,
         correspondence: Correspondence,
         given: GivenSurface,
+        mesh: TargetMesh | None,
     ) -> PathResult:
         """One process on one region of the target."""
         made = PathResult(region, number, process, process.transfer_mode)
@@ -252,9 +257,10 @@ class ProcessTransfer:
         warnings: tuple[str, ...] = ()
         try:
             if process.transfer_mode == "replan":
-                segments = plan(surface, inside, strategy)
+                segments = on_mesh(plan(surface, inside, strategy), mesh, strategy)
             else:
-                process, segments, warnings = self._warp(region, number, process, correspondence)
+                step = region, number, process, correspondence, mesh
+                process, segments, warnings = self._warp(*step)
             metrics = measure_path(surface, inside, strategy, segments, given)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
@@ -262,11 +268,17 @@ class ProcessTransfer:
         return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
 
     def _warp(
-        self, region: str, number: int, process: Process, correspondence: Correspondence
+        self,
+        region: str,
+        number: int,
+        process: Process,
+        correspondence: Correspondence,
+        mesh: TargetMesh | None,
     ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
         """A process with its waypoints warped to the target, its segments there, and warnings."""
         here = self.reference_segments(region, number)
         there, lost = warp_segments(correspondence, here, process.tool.radius_m)
+        there = on_mesh(there, mesh, strategy_of(process))
         total = sum(len(segment.positions) for segment in here)
         if not there:
             raise ProcessError(f"none of the {total} waypoints has a place on the target")
