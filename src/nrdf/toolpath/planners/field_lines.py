@@ -20,7 +20,7 @@ from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
 _EDGE, _OPEN = 0.45, 0.3
-_SPECK = 0.05
+_SPECK = 0.5
 """Share of the footprint's area that a part must have to get a line."""
 _LEAST_SPACING = 0.9
 _PIECE, _NEXT_TO = 8.0, 0.6
@@ -102,7 +102,6 @@ def driven(
     kept = [line for line, way in zip(lines, length, strict=True) if way >= least > 0.0]
     if not kept:
         return []
-    kept = _needed(kept, strategy)
     placed = [resampled(line, strategy.spacing_m) for line in kept]
     contacts = np.concatenate([points for points, _ in placed])
     faces = part.mesh.origin[np.concatenate([face for _, face in placed])]
@@ -119,6 +118,8 @@ def driven(
 
 def _needed(lines: list[MeshLine], strategy: Strategy) -> list[MeshLine]:
     """Lines without the short ones that run next to longer ones: ends of lines that meet."""
+    if not lines:
+        return lines
     length = np.array([total_length(line.points) for line in lines])
     short = length < min(_PIECE * strategy.stepover_m, 0.5 * float(length.max()))
     if not short.any() or short.all():
@@ -142,7 +143,7 @@ def lines_at(part: Part, values: np.ndarray, strategy: Strategy) -> list[MeshLin
     if not weight.any():
         return []
     levels = even_levels(values, weight, strategy.stepover_m)
-    return part.inside(level_lines(part.mesh, values, levels), margin)
+    return _needed(part.inside(level_lines(part.mesh, values, levels), margin), strategy)
 
 
 def checked(paths: list[SurfacePath], strategy: Strategy) -> list[SurfacePath]:

@@ -1,4 +1,7 @@
-"""Plane slices: lines where parallel planes, one stepover apart, cut the region."""
+"""Plane slices: lines where parallel planes, one stepover apart, cut the region.
+
+The planner that slicers have, and the rival of `nrdf.toolpath.planners.raster`.
+"""
 
 from __future__ import annotations
 

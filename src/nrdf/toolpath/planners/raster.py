@@ -14,6 +14,7 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_across, even_share, signed_distance
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine
+from nrdf.toolpath.planners.missed_area import fill_missed_area
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -33,7 +34,7 @@ def plan_raster(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """
     found = []
     for part in parts_of(region, strategy):
-        found += driven(region, part, raster_lines(part, strategy), strategy)
+        found += driven(region, part, raster_lines(region, part, strategy), strategy)
     return checked(found, strategy)
 
 
@@ -41,19 +42,19 @@ def plan_cross_hatch(region: RegionMesh, strategy: Strategy) -> list[SurfacePath
     """A raster, and a second one across it. Raises ProcessError as `plan_raster` does."""
     found, across = [], []
     for part in parts_of(region, strategy):
-        found += driven(region, part, raster_lines(part, strategy), strategy)
+        found += driven(region, part, raster_lines(region, part, strategy), strategy)
         along = line_direction(part, strategy.direction)
         outward = part.axes[2] if part.outward is None else part.outward
         turned = replace(strategy, direction=np.cross(outward, along))
-        across += driven(region, part, raster_lines(part, turned), turned)
+        across += driven(region, part, raster_lines(region, part, turned), turned)
     return checked(found + across, strategy)
 
 
-def raster_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
+def raster_lines(region: RegionMesh, part: Part, strategy: Strategy) -> list[MeshLine]:
     """The lines of one part: of equal distance from its middle line."""
     along = line_direction(part, strategy.direction)
     best: list[MeshLine] = []
-    most = -1.0
+    most, chosen = -1.0, np.zeros(0)
     extent = float(np.ptp(part.mesh.vertices @ along))
     for across in across_directions(part, along):
         height = _height(part, across)
@@ -66,10 +67,10 @@ def raster_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
             lines = lines_at(part, distance, strategy)
             value = usual_length(lines) * even_share(part.mesh, distance)
             if value > _BETTER * most:
-                best, most = lines, value
+                best, most, chosen = lines, value, distance
             if value >= _WHOLE * extent:
-                return best
-    return best
+                return fill_missed_area(region, part, distance, lines, strategy)
+    return fill_missed_area(region, part, chosen, best, strategy)
 
 
 def usual_length(lines: Sequence[MeshLine]) -> float:

@@ -32,7 +32,7 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     found: list[SurfacePath] = []
     for part in parts_of(region, strategy):
         strokes = rod_strokes(region, part, strategy)
-        found += strokes or driven(region, part, raster_lines(part, strategy), strategy)
+        found += strokes or driven(region, part, raster_lines(region, part, strategy), strategy)
     return checked(found, strategy)
 
 
