@@ -25,7 +25,7 @@ _OF_RADIUS = 0.35  # of the tool that heat spreads over, at least
 _EDGE = 1.5  # edges of the fine mesh along that way
 _MOST_FACES = 120_000
 _MOST_PARTS = 200  # each of which is asked for what it covers
-_OFF, _INSIDE, _HALVINGS = 1e-4, 0.6, 10  # as of `mesh_repair`, and steps to the place of a change
+_OFF, _INSIDE, _HALVINGS = 1e-4, 0.6, 5  # as of `mesh_repair`, and steps to the place of a change
 
 
 @dataclass(frozen=True)

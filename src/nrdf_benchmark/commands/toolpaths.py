@@ -20,6 +20,7 @@ def toolpaths(
     edge_margin_mm: NonNegative = 0.0,
     meshes: tuple[Annotated[Path, Metavar("FOLDER")], ...] = (),
     planner: str = "points",
+    surface: Literal["mesh", "votes", "scan"] = "mesh",
     sample: Count | None = None,
     out: Folder | None = None,
     overwrite: bool = False,
@@ -46,12 +47,15 @@ def toolpaths(
         edge_margin_mm: Margin along the regions' borders; not for --meshes.
         meshes: Folders of meshes, or mesh files.
         planner: "points", which transfer uses, or a planner's name in nrdf.toolpath.planners.
+        surface: What the planners of nrdf.toolpath.planners plan on: the mesh with its own faces as
+            regions; "votes": the mesh, regions by votes of points as in retrieval; "scan": a mesh
+            made of a simulated scan of three views, 200,000 points with noise of 1 mm.
         sample: Only so many meshes of each folder, evenly chosen.
         out: Folder for the results on meshes: tables, and a row a region as CSV and JSON.
         overwrite: Start anew, whatever is in the folder.
     """
     if meshes:
-        _on_meshes(meshes, planner, sample, trajectory, out, overwrite)
+        _on_meshes(meshes, planner, surface, sample, trajectory, out, overwrite)
         return
     if category is None:
         from nrdf.errors import DataError
@@ -94,6 +98,7 @@ def toolpaths(
 def _on_meshes(
     meshes: tuple[Path, ...],
     planner: str,
+    surface: Literal["mesh", "votes", "scan"],
     sample: int | None,
     trajectory: str,
     out: Path | None,
@@ -113,8 +118,8 @@ def _on_meshes(
     sources = target_sources(meshes, sample)
     cache = None if out is None else LineCache(out, overwrite)
     with progress_bar(f"meshes, {planner}") as progress:
-        results = evaluate_mesh_paths(sources, planner, cache, progress, trajectory)
-    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}"
+        results = evaluate_mesh_paths(sources, planner, cache, progress, trajectory, surface)
+    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}, {surface}"
     for what, chosen in selections(results):
         shown = table(f"\n{title}: {what}, {len(chosen)}", "", *HEADINGS)
         for row in mesh_rows(chosen):

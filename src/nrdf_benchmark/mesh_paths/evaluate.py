@@ -10,17 +10,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import igl
 import numpy as np
 
 from nrdf.errors import DataError, NrdfError, unknown_name
 from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.planner import add_approach_retract, plan, tool_segments
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
+from nrdf_benchmark.mesh_paths.found_surface import SurfaceKind, regions_on
 from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, TargetSource
 from nrdf_benchmark.result_cache import LineCache, code_checksum
@@ -61,22 +60,24 @@ def evaluate_mesh_paths(
     cache: LineCache | None = None,
     progress: Callable[[int, int], None] | None = None,
     trajectory: str | None = None,
+    surface: SurfaceKind = "mesh",
 ) -> list[MeshPathResult]:
     """Plan and measure on every region; meshes that `cache` has are not planned on again.
 
-    trajectory: of today's planner, "raster" unless given. `progress` is told (done, all). Raises
-    DataError for a planner that there is not, or a mesh that cannot be used.
+    trajectory: of today's planner, "raster" unless given. surface: what the others plan on.
+    `progress` is told (done, all). Raises DataError for a planner that there is not, or a mesh that
+    cannot be used.
     """
     if planner not in planner_names():
         raise DataError(unknown_name("planner", planner, planner_names()))
-    marks = {_fingerprint(source, planner, trajectory): source.name for source in sources}
-    file = f"toolpaths-{planner}.jsonl"
+    marks = {_fingerprint(source, planner, trajectory, surface): source.name for source in sources}
+    file = f"toolpaths-{planner}-{surface}.jsonl"
     lines = cache.read(file, marks) if cache else {}
     results = []
     for number, (mark, source) in enumerate(zip(marks, sources, strict=True)):
         found = _parse(lines.get(source.name))
         if found is None:
-            found = _evaluate(source.read(), planner, trajectory)
+            found = _evaluate(source.read(), planner, trajectory, surface)
             if cache:
                 cache.append(file, mark, {"results": [asdict(result) for result in found]})
         results += found
@@ -85,12 +86,17 @@ def evaluate_mesh_paths(
     return results
 
 
-def _evaluate(target: MeshTarget, planner: str, trajectory: str | None) -> list[MeshPathResult]:
+def _evaluate(
+    target: MeshTarget, planner: str, trajectory: str | None, surface: SurfaceKind
+) -> list[MeshPathResult]:
     strategy = target.strategy
     if trajectory is not None:
         strategy = replace(strategy, trajectory=trajectory)  # type: ignore[arg-type]
     start = time.process_time()
-    make = _today(target, strategy) if planner == TODAY else _on_mesh(target, planner, strategy)
+    if planner == TODAY:
+        make = _today(target, strategy)
+    else:
+        make = _on_mesh(target, planner, strategy, surface)
     shared = (time.process_time() - start) / max(len(target.visible_regions), 1)
     results = []
     for region in target.visible_regions:
@@ -129,17 +135,13 @@ def _mesh_planners() -> dict[str, Callable[[Any, Strategy], list[Any]]]:
         return {}
 
 
-def _on_mesh(target: MeshTarget, planner: str, strategy: Strategy) -> RegionPlanner:
-    """On the mesh itself: a region is those faces that lie on the region's own."""
-    surface = importlib.import_module("nrdf.surface.target_mesh").TargetMesh.from_mesh(
-        Mesh(target.vertices, target.faces)
-    )
-    region_mesh = importlib.import_module("nrdf.surface.region_mesh").RegionMesh
-    face = _nearest_face(target, surface.vertices[surface.faces].mean(axis=1))
+def _on_mesh(
+    target: MeshTarget, planner: str, strategy: Strategy, surface: SurfaceKind
+) -> RegionPlanner:
+    find = regions_on(target, surface)
 
     def make(region: str) -> tuple[Segment, ...]:
-        faces = region_mesh.from_faces(surface, target.regions[region][face])
-        paths = _mesh_planners()[planner](faces, strategy)
+        paths = _mesh_planners()[planner](find(region), strategy)
         normals = [path.normals for path in paths]
         lines = tool_segments([path.contacts for path in paths], normals, strategy)
         return add_approach_retract(lines, normals, strategy)
@@ -147,15 +149,10 @@ def _on_mesh(target: MeshTarget, planner: str, strategy: Strategy) -> RegionPlan
     return make
 
 
-def _nearest_face(target: MeshTarget, points: np.ndarray) -> np.ndarray:
-    vertices, faces = np.ascontiguousarray(target.vertices), np.ascontiguousarray(target.faces)
-    tree = igl.AABB()
-    tree.init(vertices, faces)
-    return np.asarray(tree.squared_distance(vertices, faces, np.ascontiguousarray(points))[1])
-
-
-def _fingerprint(source: TargetSource, planner: str, trajectory: str | None) -> str:
-    parts = [source.name, source.checksum, planner, trajectory, code_checksum(SOURCES)]
+def _fingerprint(
+    source: TargetSource, planner: str, trajectory: str | None, surface: SurfaceKind
+) -> str:
+    parts = [source.name, source.checksum, planner, trajectory, surface, code_checksum(SOURCES)]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
 

@@ -71,7 +71,9 @@ def test_planners_are_told_by_name(source, monkeypatch):
     monkeypatch.setitem(sys.modules, "nrdf.toolpath.planners", module)
     assert planner_names() == (TODAY, "rows")
     monkeypatch.setattr(
-        evaluate, "_on_mesh", lambda target, planner, strategy: lambda _: rows_on_top([0.0])
+        evaluate,
+        "_on_mesh",
+        lambda target, planner, strategy, surface: lambda _: rows_on_top([0.0]),
     )
     (result,) = evaluate_mesh_paths([source], "rows")
     assert result.planner == "rows" and result.metrics.strokes == 1
