@@ -119,7 +119,9 @@ def _on_meshes(
     cache = None if out is None else LineCache(out, overwrite)
     with progress_bar(f"meshes, {planner}") as progress:
         results = evaluate_mesh_paths(sources, planner, cache, progress, trajectory, surface)
-    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}, {surface}"
+    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}"
+    if surface != "mesh":
+        title += f", on {surface}"
     for what, chosen in selections(results):
         shown = table(f"\n{title}: {what}, {len(chosen)}", "", *HEADINGS)
         for row in mesh_rows(chosen):
