@@ -16,6 +16,10 @@ from nrdf.surface.surface import Surface
 from nrdf.toolpath.contour import contour, spiral
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
 from nrdf.toolpath.gap_filling import fill_missed_points, fill_wide_gaps
+from nrdf.toolpath.modifiers.minimum_length import minimum_length
+from nrdf.toolpath.modifiers.order import order_nearest
+from nrdf.toolpath.modifiers.smooth_orientation import smooth_orientation
+from nrdf.toolpath.modifiers.split import split
 from nrdf.toolpath.plan_size import check_passes, check_size
 from nrdf.toolpath.raster import raster
 from nrdf.toolpath.sampled_path import line_spacing, sample_lines
@@ -30,6 +34,8 @@ from nrdf.toolpath.types import Segment
 
 LEAST_IN_SURFACE = 0.2
 """A direction with a smaller share of its length in a patch's surface gives no direction there."""
+_LARGEST_STEP = 2.0  # spacings between waypoints of one line
+_LARGEST_TILT_RAD = float(np.radians(5.0))  # of the axis off its own, where its turn is limited
 _TRIES, _WIDE = 3, 1.1  # of lines that are more stepovers apart
 
 
@@ -47,7 +53,10 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
     patches = patches_of(surface, region)
     _check_stepover(patches, strategy)
     check_size(patches, strategy)
-    lines: list[SurfacePath] = []
+    wanted = inside_margin(surface, region, patches, strategy.edge_margin_m)
+    points, outward = surface.points[wanted], surface.normals[wanted]
+    reach, apart = strategy.tool_radius_m, strategy.stepover_m
+    sweeps: list[list[SurfacePath]] = []
     for sweep in _sweeps(patches, strategy):
         found = [
             block
@@ -55,21 +64,45 @@ def plan(surface: Surface, region: np.ndarray, strategy: Strategy) -> tuple[Segm
             for block in _evenly_spaced(surface, patch, paths, strategy)
         ]
         drawn = [line for block in order_nearest_first(found) for line in block]
-        lines += drawn
-        reach, apart = strategy.tool_radius_m, strategy.stepover_m
-        lines += fill_wide_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
-    if not lines:
+        drawn = _steady(drawn, points, outward, strategy)
+        drawn = minimum_length(drawn, reach, points, outward, reach)
+        filled = fill_wide_gaps(surface, patches, drawn, strategy.spacing_m, reach, apart)
+        sweeps.append([*drawn, *filled])
+    if not any(sweeps):
         deepest = max(patch.border.deepest for patch in patches)
         raise ProcessError(
             f"edge_margin_m is {strategy.edge_margin_m:g}, which leaves nothing of the region: its "
             f"innermost place is {deepest:.3g} m from its border; give less than that"
         )
-    wanted = inside_margin(surface, region, patches, strategy.edge_margin_m)
-    lines += fill_missed_points(
-        surface, wanted, lines, strategy.spacing_m, strategy.tool_radius_m, strategy.stepover_m
-    )
+    every_line = [line for made in sweeps for line in made]
+    sweeps[-1] += fill_missed_points(surface, wanted, every_line, strategy.spacing_m, reach, apart)
+    lines = [
+        line for made in sweeps for line in order_nearest(_steady(made, points, outward, strategy))
+    ]
     contacts, normals = [line.contacts for line in lines], [line.normals for line in lines]
     return add_approach_retract(tool_segments(contacts, normals, strategy), normals, strategy)
+
+
+def _steady(
+    lines: Sequence[SurfacePath],
+    points: np.ndarray,
+    normals: np.ndarray,
+    strategy: Strategy,
+) -> list[SurfacePath]:
+    """Lines without steps above twice the spacing, whose axis turns no faster than its limit.
+
+    Pieces of lines that were split go where they are short and reach none of points (n, 3), with
+    outward normals (n, 3), alone.
+    """
+    parts = [
+        smooth_orientation(
+            split([line], _LARGEST_STEP * strategy.spacing_m), largest_tilt_rad=_LARGEST_TILT_RAD
+        )
+        for line in lines
+    ]
+    pieces = np.array([len(part) > 1 for part in parts for _ in part], dtype=bool)
+    whole, radius = [line for part in parts for line in part], strategy.tool_radius_m
+    return minimum_length(whole, radius, points, normals, radius, droppable=pieces)
 
 
 def add_approach_retract(

@@ -1,0 +1,82 @@
+"""Smooth orientation: the tool's axis turns no faster than a limit, and no farther off than one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polylines import step_lengths
+from nrdf.toolpath.modifiers.split import LEAST_STEP_M, cut, turns
+from nrdf.toolpath.surface_path import SurfacePath
+
+LARGEST_TURN_RAD_M = float(np.radians(3.0)) * 1e3
+"""3° a mm."""
+LARGEST_TILT_RAD = float(np.radians(35.0))
+_ROUNDS, _CLOSE = 400, 1e-3  # of the relaxation, and the share of the limit that is left over
+
+
+def smooth_orientation(
+    paths: Sequence[SurfacePath],
+    largest_turn_rad_m: float = LARGEST_TURN_RAD_M,
+    largest_tilt_rad: float = LARGEST_TILT_RAD,
+) -> list[SurfacePath]:
+    """Paths whose normals turn by at most `largest_turn_rad_m` for each m of the way.
+
+    The normals next to a sharp turn are turned towards each other; contacts stay where they are.
+    Where a normal would be more than `largest_tilt_rad` off its own, the path is split at the
+    sharpest turn instead.
+    """
+    smooth: list[SurfacePath] = []
+    waiting = list(paths)[::-1]
+    while waiting:
+        path = waiting.pop()
+        allowed = largest_turn_rad_m * np.maximum(step_lengths(path.contacts), LEAST_STEP_M)
+        found = turns(path.normals)
+        if (found <= allowed).all():
+            smooth.append(path)
+            continue
+        normals = _relaxed(path.normals, allowed)
+        chord = np.linalg.norm(normals - path.normals, axis=1)
+        off = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+        settled = (turns(normals) <= allowed).all()
+        if settled and off.max() <= largest_tilt_rad:
+            smooth.append(replace(path, normals=normals))
+            continue
+        sharpest = np.arange(len(found)) == np.argmax(found / allowed)
+        waiting += cut(path, sharpest)[::-1]
+    return smooth
+
+
+def _relaxed(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Normals (n, 3) turned until neighbours differ by at most `allowed` (n - 1,), rad, if the
+    rounds suffice for that.
+
+    Every second pair at a time, whose ends share the excess of their turn.
+    """
+    normals, target = normals.copy(), (1.0 - _CLOSE) * allowed
+    pairs = [np.arange(first, len(allowed), 2) for first in (0, 1)]
+    for _ in range(_ROUNDS):
+        for i in pairs:
+            one, other = normals[i], normals[i + 1]
+            turn = turns_between(one, other)
+            wide = turn > target[i]
+            if not wide.any():
+                continue
+            i, one, other, turn = i[wide], one[wide], other[wide], turn[wide]
+            share = (0.5 * (1.0 - target[i] / turn))[:, None]
+            angle, sine = turn[:, None], np.maximum(np.sin(turn), 1e-9)[:, None]
+            near, far = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
+            normals[i] = unit_vectors(near * one + far * other)
+            normals[i + 1] = unit_vectors(near * other + far * one)
+        if (turns(normals) <= allowed).all():
+            break
+    return normals
+
+
+def turns_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angles (n,), rad, between unit directions (n, 3)."""
+    chord = np.linalg.norm(other - one, axis=1)
+    return np.asarray(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
