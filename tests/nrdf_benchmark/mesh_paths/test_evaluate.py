@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-import types
-
 import pytest
 
-from builders.mesh_targets import PLATE, plate_target, rows_on_top
+from builders.mesh_targets import plate_target, rows_on_top
 from nrdf.errors import DataError, ProcessError
 from nrdf_benchmark.mesh_paths import evaluate
 from nrdf_benchmark.mesh_paths.evaluate import TODAY, evaluate_mesh_paths, planner_names
@@ -63,18 +60,12 @@ def test_a_region_that_cannot_be_planned_has_its_reason(source, monkeypatch):
     assert result.metrics is None and result.error == "stepover_m is 9"
 
 
-def test_planners_are_told_by_name(source, monkeypatch):
+def test_planners_are_told_by_name(source):
     with pytest.raises(DataError, match="points"):
         evaluate_mesh_paths([source], "rastre")
-    module = types.ModuleType("nrdf.toolpath.planners")
-    module.PLANNERS = {"rows": None}
-    monkeypatch.setitem(sys.modules, "nrdf.toolpath.planners", module)
-    assert planner_names() == (TODAY, "rows")
-    monkeypatch.setattr(
-        evaluate,
-        "_on_mesh",
-        lambda target, planner, strategy, surface: lambda _: rows_on_top([0.0]),
-    )
-    (result,) = evaluate_mesh_paths([source], "rows")
-    assert result.planner == "rows" and result.metrics.strokes == 1
-    assert PLATE.stepover_m == 0.025
+    assert planner_names()[:2] == (TODAY, "raster")
+    (result,) = evaluate_mesh_paths([source], "raster")
+    assert result.planner == "raster" and not result.error
+    assert result.metrics.distance_worst_m < 1e-6 and result.metrics.coverage > 0.99
+    assert result.metrics.step_worst <= 2.0
+    assert result.metrics.strokes == 1  # joined on the surface

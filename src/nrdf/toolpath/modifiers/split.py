@@ -31,6 +31,8 @@ def split(
 def cut(path: SurfacePath, after: np.ndarray) -> list[SurfacePath]:
     """The pieces of a path of n points that is cut at those of its steps (n - 1,); pieces of one
     point are dropped."""
+    if not after.any():
+        return [path]
     runs = np.split(np.arange(len(path.contacts)), np.flatnonzero(after) + 1)
     return [SurfacePath(path.contacts[run], path.normals[run]) for run in runs if len(run) > 1]
 
