@@ -39,3 +39,12 @@ def test_loose_triangles_are_no_surface():
     vertices = np.random.default_rng(0).random((60_000, 3))
     with pytest.raises(DataError, match="20000 of its 20000 triangles touch no other"):
         repaired_skin(vertices, np.arange(60_000).reshape(-1, 3))
+
+
+def test_triangles_that_nearly_touch_are_sewn_together():
+    sphere = trimesh.creation.icosphere(2)
+    corners = np.asarray(sphere.vertices)[sphere.faces].reshape(-1, 3)
+    corners += 1e-7 * np.random.default_rng(0).normal(size=corners.shape)
+    vertices, skin, repairs = repaired_skin(corners, np.arange(len(corners)).reshape(-1, 3))
+    assert trimesh.Trimesh(vertices, skin, process=False).is_watertight
+    assert repairs == ("320 faces that touched no other sewn to their neighbours",)

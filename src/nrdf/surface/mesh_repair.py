@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import igl
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError
 from nrdf.geometry.mesh import check_mesh, clean_mesh, outer_skin
@@ -15,6 +18,7 @@ _INSIDE = 0.6  # winding number from which a place is inside; half-way is on the
 _PLACES = np.array(
     [[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2], [5.6, 0.2, 0.2], [0.2, 5.6, 0.2], [0.2, 0.2, 5.6]]
 )
+_SAME_PLACE = 2e-6  # longest sides within which vertices of loose triangles are one
 _LOOSE, _MANY_LOOSE = 0.5, 10_000  # share and number of faces that touch no other: no surface
 
 
@@ -33,6 +37,12 @@ def repaired_skin(
     if len(faces) < given:
         repairs.append(_said(given - len(faces), "without area or given twice", "removed"))
     loose = _loose(faces)
+    if loose > _LOOSE * len(faces) and len(faces) > 1:
+        sewn = _sewn(vertices, faces)
+        vertices, faces = clean_mesh(*sewn)
+        if (left := _loose(faces)) < loose:
+            repairs.append(_said(loose - left, "that touched no other", "sewn to their neighbours"))
+        loose = left
     if loose > _LOOSE * len(faces) and loose > _MANY_LOOSE:
         raise DataError(
             f"{loose} of its {len(faces)} triangles touch no other: that is no surface; "
@@ -76,6 +86,17 @@ def _loose(faces: np.ndarray) -> int:
     """How many faces share no vertex with another."""
     count = np.bincount(faces.reshape(-1))
     return int((count[faces] == 1).all(axis=1).sum())
+
+
+def _sewn(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices that are nearly in one place as one."""
+    near = cKDTree(vertices).query_pairs(
+        _SAME_PLACE * float(np.ptp(vertices, axis=0).max()), output_type="ndarray"
+    )
+    links = coo_matrix((np.ones(len(near), bool), tuple(near.T)), (len(vertices),) * 2)
+    place = connected_components(links, directed=False)[1]
+    first = np.unique(place, return_index=True)[1]
+    return vertices[first], place[faces]
 
 
 def _said(count: int, which: str, done: str) -> str:
