@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.frames import (
+    angles_between,
     frames_from_z_and_x,
     perpendicular,
     quaternions_wxyz,
@@ -78,3 +79,10 @@ def test_signs_of_quaternions_do_not_jump():
     steady = without_sign_jumps(quaternions)
     assert (np.einsum("na,na->n", steady[1:], steady[:-1]) > 0.9).all()
     np.testing.assert_allclose(z_axes(steady), z_axes(quaternions))
+
+
+def test_small_and_half_turns_are_told_alike():
+    for angle in (0.0, 1e-9, 0.3, np.pi / 2, np.pi):
+        turned = np.array([[np.cos(angle), np.sin(angle), 0.0]])
+        found = angles_between(np.array([[1.0, 0.0, 0.0]]), turned)
+        np.testing.assert_allclose(found, angle, rtol=1e-6, atol=1e-12)

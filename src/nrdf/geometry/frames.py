@@ -15,6 +15,13 @@ def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     return np.asarray(vectors) / np.maximum(length, 1e-12)
 
 
+def angles_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angles (n,), rad, between unit vectors (n, 3)."""
+    # The chord tells small angles better than the cosine does.
+    chord = np.linalg.norm(other - one, axis=1)
+    return np.asarray(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
+
+
 def perpendicular(axes: np.ndarray) -> np.ndarray:
     """Unit vectors (n, 3) square to unit vectors (n, 3): to each of them and to x, or to y where
     it is along x itself."""

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from builders.surface_paths import over_an_edge, straight
+from nrdf.geometry.frames import angles_between
 from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.modifiers.smooth_orientation import (
     LARGEST_TILT_RAD,
     LARGEST_TURN_RAD_M,
     smooth_orientation,
-    turns_between,
 )
 from nrdf.toolpath.modifiers.split import turns
 
@@ -32,7 +32,7 @@ def test_no_turn_is_above_the_limit(degrees, spacing):
     for one in made:
         np.testing.assert_allclose(np.linalg.norm(one.normals, axis=1), 1.0)
         before = path.normals[np.searchsorted(path.contacts[:, 0], one.contacts[:, 0] - 1e-9)]
-        assert turns_between(one.normals, before).max() <= LARGEST_TILT_RAD
+        assert angles_between(one.normals, before).max() <= LARGEST_TILT_RAD
     assert np.array_equal(np.concatenate([one.contacts for one in made]), path.contacts)
     assert np.array_equal(path.normals, given)
 

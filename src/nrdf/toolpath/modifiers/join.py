@@ -6,9 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.frames import angles_between, unit_vectors
 from nrdf.geometry.polylines import step_lengths
-from nrdf.toolpath.modifiers.smooth_orientation import turns_between
 from nrdf.toolpath.surface_path import SurfacePath
 
 Project = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -65,7 +64,7 @@ def _way(
     gap = float(np.linalg.norm(stop - start))
     if gap > largest_gap_m:
         return None
-    if turns_between(last.normals[-1:], path.normals[:1])[0] > largest_turn_rad:
+    if angles_between(last.normals[-1:], path.normals[:1])[0] > largest_turn_rad:
         return None
     count = int(np.ceil(gap / spacing_m - 1e-9)) + 1
     share = np.linspace(0.0, 1.0, max(count, 2))[1:-1, None]

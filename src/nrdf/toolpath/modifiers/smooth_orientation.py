@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.frames import angles_between, unit_vectors
 from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.modifiers.split import LEAST_STEP_M, cut, turns
 from nrdf.toolpath.surface_path import SurfacePath
@@ -39,8 +39,7 @@ def smooth_orientation(
             smooth.append(path)
             continue
         normals = _relaxed(path.normals, allowed)
-        chord = np.linalg.norm(normals - path.normals, axis=1)
-        off = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+        off = angles_between(path.normals, normals)
         settled = (turns(normals) <= allowed).all()
         if settled and off.max() <= largest_tilt_rad:
             smooth.append(replace(path, normals=normals))
@@ -61,7 +60,7 @@ def _relaxed(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     for _ in range(_ROUNDS):
         for i in pairs:
             one, other = normals[i], normals[i + 1]
-            turn = turns_between(one, other)
+            turn = angles_between(one, other)
             wide = turn > target[i]
             if not wide.any():
                 continue
@@ -74,9 +73,3 @@ def _relaxed(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         if (turns(normals) <= allowed).all():
             break
     return normals
-
-
-def turns_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angles (n,), rad, between unit directions (n, 3)."""
-    chord = np.linalg.norm(other - one, axis=1)
-    return np.asarray(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))

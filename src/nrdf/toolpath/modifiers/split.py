@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from nrdf.geometry.frames import angles_between
 from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -39,6 +40,4 @@ def cut(path: SurfacePath, after: np.ndarray) -> list[SurfacePath]:
 
 def turns(directions: np.ndarray) -> np.ndarray:
     """Angles (n - 1,), rad, between unit directions (n, 3) that follow each other."""
-    # The chord tells small angles better than the cosine does.
-    chord = np.linalg.norm(np.diff(directions, axis=0), axis=1)
-    return np.asarray(2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0)))
+    return angles_between(directions[:-1], directions[1:])
