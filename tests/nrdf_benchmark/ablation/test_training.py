@@ -7,6 +7,7 @@ import threading
 import pytest
 import torch
 
+from builders.tiny_ablation import CONFIG, STAGES
 from builders.tiny_field import balls, tiny_config, write_folder
 from nrdf.errors import ConfigError
 from nrdf.field import PRESETS
@@ -25,15 +26,6 @@ from nrdf_benchmark.ablation.training import (
     train_variants,
     variant_config,
 )
-
-PAPER = {"chamfer": 10, "emd": 1, "smoothness": 0.1, "normal_consistency": 0.01}
-WEIGHTS = {"occupancy": 10, "self": 1, **PAPER, "descriptor_distance": 0.1}
-STAGES = [
-    {"name": "a", "weights": {"occupancy": 1}, "steps": 2, "batch_size": 4, "rate": 0.01},
-    {"name": "b", "weights": {"occupancy": 1, "self": 1}, "steps": 3, "batch_size": 4},
-    {"name": "c", "weights": WEIGHTS, "steps": 4, "batch_size": 4, "rate": 0.01},
-]
-CONFIG = tiny_config(stages=STAGES)
 
 
 @pytest.fixture(autouse=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from builders.labelled_boxes import write_objects
+from builders.pair_results import pair, part
 from nrdf.field.zoo import find_weights
 from nrdf_benchmark.methods.registry import find_methods
 from nrdf_benchmark.objects.picture import draw_worst, worst_pairs
 from nrdf_benchmark.objects.retrieval import (
-    ObjectPairResult,
-    PartResult,
     Settings,
     shared_retrieval,
 )
@@ -31,15 +30,6 @@ def test_pictures_of_the_worst_pairs(settings, tmp_path):
     names = {path.name.split("-", 1)[1] for path in paths}
     assert names == {"chair_low-to-chair_high.png", "chair_low-to-stool_plain.png"}
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
-
-
-def part(name, state="there", iou=None, reason="", score=None):
-    told = {} if score is None else {"confidence": 0.5, "observed": 1.0, "evidence": (1.0, 2.0)}
-    return PartResult(name, state, 100, 90, iou, reason, score, **told)
-
-
-def pair(method, reference, target, *parts, views=0, mixed=(0.0, 0.0), pose=None):
-    return ObjectPairResult(method, views, reference, target, 0.5, parts, mixed, pose)
 
 
 def test_worst_pairs_come_first_and_those_without_parts_not_at_all():
