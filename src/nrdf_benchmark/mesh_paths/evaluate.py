@@ -14,13 +14,11 @@ import numpy as np
 from nrdf.errors import DataError, NrdfError, unknown_name
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.sampling import downsample, indices_in_subset
-from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.modifiers import join, order_nearest, smooth_orientation, split
-from nrdf.toolpath.planner import add_approach_retract, plan, tool_segments
+from nrdf.toolpath.mesh_planner import plan_on_mesh
+from nrdf.toolpath.planner import plan
 from nrdf.toolpath.planners import PLANNERS
 from nrdf.toolpath.strategy import Strategy
-from nrdf.toolpath.surface_path import SurfacePath
 from nrdf.toolpath.types import Segment
 from nrdf_benchmark.mesh_paths.found_surface import SurfaceKind, regions_on
 from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
@@ -138,33 +136,9 @@ def _on_mesh(
 
     def make(region: str) -> tuple[Segment, ...]:
         found = find(region)
-        paths = _modified(PLANNERS[planner](found, strategy), found, strategy)
-        normals = [path.normals for path in paths]
-        lines = tool_segments([path.contacts for path in paths], normals, strategy)
-        return add_approach_retract(lines, normals, strategy)
+        return plan_on_mesh(found, strategy, PLANNERS[planner])
 
     return make
-
-
-def _modified(
-    paths: list[SurfacePath], region: RegionMesh, strategy: Strategy
-) -> list[SurfacePath]:
-    """What a planner on the mesh made, within the limits, in a short order, joined on the mesh."""
-
-    def project(
-        points: np.ndarray, normals: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        found = region.mesh.nearest(points, normals)
-        smooth = region.parent.smooth_normals(
-            found.points, region.parent.nearest(found.points, found.normals).faces,
-            strategy.tool_radius_m,
-        )  # fmt: skip
-        return found.points, smooth, found.distances < strategy.tool_radius_m
-
-    step = 2.0 * strategy.spacing_m
-    steady = smooth_orientation(split(paths, step))
-    joined = join(order_nearest(steady), project, strategy.spacing_m, 2.0 * strategy.stepover_m)
-    return order_nearest(smooth_orientation(split(joined, step)))
 
 
 def _fingerprint(
