@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nrdf.errors import ProcessError
-from nrdf.surface.region_mesh import RegionMesh, region_mesh
+from nrdf.surface.region_mesh import RegionMesh, region_mesh, region_meshes
 from nrdf.surface.target_mesh import TargetMesh
 
 
@@ -99,3 +99,16 @@ def test_a_region_smaller_than_the_tool_is_refused():
         region_mesh(sheet, *votes, 0.3)
     with pytest.raises(ProcessError, match="radius must be above 0"):
         region_mesh(sheet, *votes, 0.0)
+
+
+def test_all_regions_at_once_and_why_one_is_left_out():
+    sheet = plate(3)
+    points, normals, left = votes_on(sheet, lambda x, y: x < 0.5)
+    x, y = points[:, :2].T
+    shares = {"left": left, "dot": np.hypot(x - 0.8, y - 0.5) < 0.1, "none": np.zeros(len(points))}
+    radii = {"left": 0.05, "dot": 0.3, "none": 0.05}
+    meshes = region_meshes(sheet, points, normals, shares, radii)
+    assert list(meshes.found) == ["left"]
+    assert meshes.found["left"].area_m2 == pytest.approx(0.5, rel=0.03)
+    assert "smaller than the tool's footprint" in meshes.left_out["dot"]
+    assert meshes.left_out["none"] == "No point belongs to the region by more than a half."

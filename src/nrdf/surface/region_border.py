@@ -17,7 +17,8 @@ from nrdf.surface.mesh_cut import FineMesh, bisected, cut, refine
 from nrdf.surface.mesh_edges import edge_components
 from nrdf.surface.target_mesh import TargetMesh
 
-_LEVEL = 0.5
+LEVEL = 0.5
+"""Membership at a region's border."""
 _VOTES, _SIDE = 6, 4.0  # votes that count at a place; spacings that opposite normals are apart
 _FAR = 4.0  # spacings from where a vote says nothing
 _SMOOTHING = 1.5  # spacings of votes that heat spreads over, at least
@@ -55,7 +56,7 @@ class Votes:
             raise ProcessError("the points of a region must be finite")
         if not ((membership >= 0.0) & (membership <= 1.0)).all():
             raise ProcessError("a membership is 0 to 1")
-        if not (membership > _LEVEL).any():
+        if not (membership > LEVEL).any():
             raise ProcessError("no point belongs to the region by more than a half")
         away = cKDTree(points).query(points, [8])[0][:, 0]
         spacing = float(np.median(away) * np.sqrt(np.pi / 7.0))
@@ -91,13 +92,13 @@ def cut_at_border(
 
     def crossing(ends: np.ndarray) -> np.ndarray:
         inner, outer = share[ends[:, 0]], share[ends[:, 1]]
-        return np.asarray((inner - _LEVEL) / np.maximum(inner - outer, 1e-12))
+        return np.asarray((inner - LEVEL) / np.maximum(inner - outer, 1e-12))
 
-    return cut(fine, share > _LEVEL, crossing)
+    return cut(fine, share > LEVEL, crossing)
 
 
 def _fine_around(target: TargetMesh, votes: Votes, reach: float, whole: bool) -> FineMesh:
-    belonging = cKDTree(votes.points[votes.membership > 0.2 * _LEVEL])
+    belonging = cKDTree(votes.points[votes.membership > 0.2 * LEVEL])
     given = FineMesh(target.vertices, target.faces, np.arange(len(target.faces)))
     margin = 2.0 * reach + 3.0 * votes.spacing
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,7 +15,7 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.surface.mesh_cut import FineMesh
 from nrdf.surface.mesh_edges import boundary_loops, edge_components, opposite_half_edges
-from nrdf.surface.region_border import Votes, cut_at_border
+from nrdf.surface.region_border import LEVEL, Votes, cut_at_border
 from nrdf.surface.target_mesh import TargetMesh
 
 _ALIKE = 0.5  # least cosine between a hole and the region around it
@@ -73,6 +74,50 @@ class RegionMesh:
         return [RegionMesh(part, self.parent, self.changes) for part in parts]
 
 
+@dataclass(frozen=True)
+class RegionMeshes:
+    """found: name to region. left_out: name of a region to the reason why there is none of it, a
+    sentence."""
+
+    found: dict[str, RegionMesh]
+    left_out: dict[str, str]
+
+
+def region_meshes(
+    target: TargetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    memberships: Mapping[str, np.ndarray],
+    tool_radius_m: Mapping[str, float],
+    fill_holes: Collection[str] = (),
+    allow_overlap: bool = False,
+) -> RegionMeshes:
+    """All regions of one object that votes stand for, with smooth borders, as tools can work them.
+
+    points: (n, 3), m, of the whole target, with outward normals (n, 3). memberships: name to (n,),
+    0 to 1. tool_radius_m: name to the radius of the tool that works the region. Specks smaller
+    than the tool's footprint are removed and holes smaller than it filled; of the regions in
+    `fill_holes` all holes are. Raises ProcessError for arrays that do not fit each other.
+    """
+    found: dict[str, RegionMesh] = {}
+    left_out: dict[str, str] = {}
+    for name, membership in memberships.items():
+        if not (np.asarray(membership) > LEVEL).any():
+            left_out[name] = "No point belongs to the region by more than a half."
+            continue
+        try:
+            found[name] = region_mesh(
+                target, points, normals, membership, tool_radius_m[name], name in fill_holes
+            )
+        except NothingLeft as error:
+            left_out[name] = f"{str(error)[0].upper()}{str(error)[1:]}."
+    return RegionMeshes(found, left_out)
+
+
+class NothingLeft(ProcessError):
+    """All parts of a region are smaller than its tool."""
+
+
 def region_mesh(
     target: TargetMesh,
     points: np.ndarray,
@@ -99,7 +144,7 @@ def region_mesh(
     inside, removed = _without_specks(target, fine, inside, footprint)
     changes += _said(removed, "speck", "smaller than the tool removed")
     if not inside.any():
-        raise ProcessError(
+        raise NothingLeft(
             "nothing is left of the region: all its parts are smaller than the tool's footprint of "
             f"{1e4 * footprint:.3g} cm²; take a smaller tool"
         )
