@@ -9,7 +9,7 @@ from builders.surfaces import SPACING, board, dome, slats, two_sided
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import indices_in_subset
-from nrdf.surface.surface import MOST_POINTS, Surface, quadrics, surface_subset
+from nrdf.surface.surface import MOST_POINTS, Surface, surface_subset
 
 
 def test_the_spacing_of_random_points_is_that_of_their_density():
@@ -108,15 +108,6 @@ def test_far_from_any_surface_a_point_stays_where_it_is():
     sideways = np.array([[1.0, 0.0, 0.0]])
     np.testing.assert_array_equal(surface.project(away, sideways)[0], away)
     np.testing.assert_array_equal(surface.smooth_normals(away, sideways, 0.03), sideways)
-
-
-def test_a_quadric_is_fitted_exactly():
-    rng = np.random.default_rng(0)
-    offset = rng.uniform(-2, 2, (5, 30, 2))
-    x, y = offset[..., 0], offset[..., 1]
-    values = 3 + 2 * x - y + 0.5 * x**2 - x * y + y**2
-    found = quadrics(offset, values[..., None], np.ones((5, 30)))[..., 0]
-    np.testing.assert_allclose(found, np.tile([3, 2, -1, 1, -1, 2], (5, 1)), atol=0.03)
 
 
 def test_a_large_cloud_is_thinned_and_regions_follow():

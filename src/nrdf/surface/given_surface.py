@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 
 from nrdf.geometry.frames import tangent_frames, unit_vectors
 from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.quadrics import quadrics
 from nrdf.io.cloud import PointCloud
-from nrdf.surface.surface import quadrics
 
 _NEIGHBOURS, _LEAST = 24, 6  # points that the surface between them is fitted to
 _FACING, _ALIKE = 0.2, 0.7  # cosines: to the tool's axis; between normals of one sheet

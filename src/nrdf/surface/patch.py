@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.quadrics import quadrics
 from nrdf.surface.border import CONTEXT, OTHER, OWN, Border
-from nrdf.surface.surface import Surface, quadrics, typical_spacing
+from nrdf.surface.surface import Surface, typical_spacing
 from nrdf.surface.unroll import Unrolled, unroll
 
 log = logging.getLogger(__name__)

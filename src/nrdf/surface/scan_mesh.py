@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
+from nrdf.geometry.quadrics import quadrics
 from nrdf.surface.mesh_edges import edge_components, opposite_half_edges
-from nrdf.surface.surface import quadrics
 from nrdf.surface.target_mesh import TargetMesh
 
 _LEAST_POINTS = 50

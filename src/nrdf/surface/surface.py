@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
+from nrdf.geometry.quadrics import quadrics
 from nrdf.geometry.sampling import distinct_points, downsample
 
 MOST_POINTS = 30_000
@@ -282,21 +283,6 @@ def typical_spacing(distance: np.ndarray, number: int) -> float:
     `number`-th neighbours."""
     # Of points spread at random, half have that neighbour within this area.
     return float(np.median(distance) * np.sqrt(np.pi / (number - 1.0 / 3.0)))
-
-
-def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Weighted least squares of 1, x, y, x²/2, xy, y²/2: coefficients (m, 6, c).
-
-    offset: (m, k, 2), of order 1; values: (m, k, c); weight: (m, k). Curvature that the points do
-    not fix is kept small.
-    """
-    x, y = offset[..., 0], offset[..., 1]
-    basis = np.stack([np.ones_like(x), x, y, x * x / 2.0, x * y, y * y / 2.0], axis=1)
-    weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
-    weighted = basis * weight[:, None]
-    normal = weighted @ basis.transpose(0, 2, 1)
-    normal += np.diag([1e-9, 1e-5, 1e-5, 3e-3, 3e-3, 3e-3])
-    return np.linalg.solve(normal, weighted @ values)
 
 
 def _in_parts(
