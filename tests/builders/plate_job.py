@@ -13,8 +13,9 @@ from nrdf.toolpath.types import Segment
 def write_job_on(folder, points, normals, region, segments):
     """A job on an object (n, 3), (n, 3) whose first points, so many, are the region 'top'."""
     import nrdf
-    from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
+    from nrdf.process.knowledge import Knowledge, Reference, Region
     from nrdf.process.knowledge_file import write_knowledge
+    from nrdf.process.process import Process, Tool
     from nrdf.process.strategy import tool_path
     from nrdf.toolpath.file import write_toolpaths
     from nrdf.toolpath.types import Job

@@ -19,8 +19,9 @@ from builders.fuzzing import altered, damaged, outcome_of, tries
 from nrdf.errors import NrdfError
 from nrdf.export.registry import export_job
 from nrdf.geometry.similarity import Similarity, up_axis, upright
-from nrdf.process.knowledge import Knowledge, Process, Reference, Region, Tool
+from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
+from nrdf.process.process import Process, Tool
 from nrdf.process.strategy import tool_path
 from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 from nrdf.toolpath.types import Job, Segment

@@ -27,6 +27,7 @@ def test_quantities_are_shown_as_people_read_them(name, value, words):
     ("other", "value", "name", "si"),
     [
         ("stepover_mm", 15, "stepover_m", 0.015),
+        ("turn_deg_mm", 180, "turn_rad_m", 1e3 * math.pi),
         ("tilt_deg", 180, "tilt_rad", math.pi),
         ("feed_mm_s", 100, "feed_m_s", 0.1),
         ("spindle_rpm", 60, "spindle_rad_s", 2 * math.pi),

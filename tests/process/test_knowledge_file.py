@@ -9,12 +9,12 @@ import pytest
 from builders.knowledge import SAND, TAUGHT, content, parsed
 from nrdf.errors import ProcessError
 from nrdf.process import knowledge_file
-from nrdf.process.knowledge import Process
 from nrdf.process.knowledge_file import (
     parse_knowledge,
     read_knowledge,
     write_knowledge,
 )
+from nrdf.process.process import Process
 
 BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"{name}: &{name} [{', '.join(['*' + before] * 9)}]\n"

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from builders.taught_box import METRICS, SAND
-from nrdf.process.knowledge import Process
 from nrdf.process.path_warnings import path_warnings
+from nrdf.process.process import Process
 
 
 def warnings_of(metrics, **changes):

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from builders.taught_box import SAND
-from nrdf.process.knowledge import Process
+from nrdf.process.process import Process
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.toolpath.types import Segment
 
@@ -24,6 +24,33 @@ def test_an_overlap_gives_the_stepover():
     content = {key: value for key, value in SAND.items() if not key.startswith("stepover")}
     half = Process.model_validate({**content, "overlap": 0.5})
     assert strategy_of(half).stepover_m == half.tool.radius_m
+
+
+def test_what_touches_stays_on_the_surface_between_lines_and_what_sprays_does_not():
+    order = {kind: strategy_of(process(kind=kind)).line_order for kind in ("sand", "oil", "clean")}
+    assert set(order.values()) == {"zigzag"}
+    for kind in ("paint", "inspect"):
+        assert strategy_of(process(kind=kind, force_n=None)).line_order == "snake"
+    one_way = process(kind="paint", force_n=None, line_order="one-way")
+    assert strategy_of(one_way).line_order == "one-way"
+
+
+def test_settings_of_modifiers_are_handed_on():
+    given = {
+        "start": "far-left", "run_off_mm": 40, "run_off_height_mm": 10, "lead_in_radius_mm": 20,
+        "lead_out_radius_mm": 30, "offset_mm": -1, "drag_mm": 5, "edge_contact_mm": 25,
+        "lead_deg": 5, "largest_turn_deg_mm": 2, "chord_error_mm": 0.1, "minimum_length_mm": 12,
+        "join_gap_mm": 8, "heading": "fixed", "constant_speed": True, "direction_mode": "fixed",
+    }  # fmt: skip
+    made = strategy_of(process(**given))
+    assert (made.start, made.heading, made.direction_mode) == ("far-left", "fixed", "fixed")
+    lengths = made.run_off_m, made.run_off_height_m, made.lead_in_radius_m, made.lead_out_radius_m
+    assert lengths == (0.04, 0.01, 0.02, 0.03)
+    assert (made.offset_m, made.drag_m, made.edge_contact_m) == (-0.001, 0.005, 0.025)
+    assert (made.chord_error_m, made.least_line_m, made.joined_gap_m) == (0.0001, 0.012, 0.008)
+    assert made.constant_speed
+    assert np.isclose(made.largest_turn_rad_m, np.radians(2.0) * 1e3)
+    assert np.isclose(strategy_of(process()).largest_turn_rad_m, np.radians(3.0) * 1e3)
 
 
 def test_a_tool_path_has_the_strategy_that_made_it():

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from builders.taught_box import SAND, SIZE, cloud
 from nrdf.errors import ProcessError
-from nrdf.process.knowledge import Process
+from nrdf.process.process import Process
 from nrdf.process.taught_paths import (
     contact_points,
     normals_under,

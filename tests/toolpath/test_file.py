@@ -126,7 +126,7 @@ def segment_with(**changes):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda c: c.update(version=4), "version 4; this nrdf reads versions up to 3: update nrdf"),
+        (lambda c: c.update(version=5), "version 5; this nrdf reads versions up to 4: update nrdf"),
         (lambda c: c.pop("version"), "version: is missing"),
         (lambda c: c.update(speed=1), "unknown key 'speed'"),
         (lambda c: c.update(frame="a\nb"), r"frame: a name with line breaks.*'a\\nb'"),

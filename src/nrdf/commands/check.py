@@ -12,7 +12,7 @@ from nrdf.commands.options import File
 
 if TYPE_CHECKING:
     from nrdf.process.check import CheckedProcess
-    from nrdf.process.knowledge import Process
+    from nrdf.process.process import Process
 
 log = logging.getLogger(__name__)
 

@@ -27,6 +27,7 @@ USUAL_SIZES = {"chair": (0.4, 1.6), "car": (2.5, 8.0), "plane": (4.0, 85.0), "ta
 _FAR = 3.0  # times outside of the usual sizes from which a unit that was given counts as doubtful
 
 OTHER_UNITS = {
+    "_deg_mm": ("_rad_m", 1e3 * math.pi / 180),
     "_mm_s": ("_m_s", 1e-3),
     "_mm": ("_m", 1e-3),
     "_deg": ("_rad", math.pi / 180),
@@ -35,6 +36,7 @@ OTHER_UNITS = {
 """Ending of a name that a file may use, the SI name's ending, and the factor to it."""
 
 _SHOWN = (
+    ("_rad_m", 180e-3 / math.pi, "° a mm"),
     ("_rad_s", 60 / (2 * math.pi), " rpm"),
     ("_m_s", 1e3, " mm/s"),
     ("_rad", 180 / math.pi, "°"),

@@ -15,8 +15,8 @@ from nrdf.geometry.sampling import distinct_points, downsample, indices_in_subse
 from nrdf.geometry.units import readable
 from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
-from nrdf.process.knowledge import Process
 from nrdf.process.path_warnings import path_warnings
+from nrdf.process.process import Process
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of

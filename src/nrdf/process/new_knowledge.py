@@ -13,8 +13,9 @@ from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.process.bound_knowledge import checksum, known_unit, overlaps, resolve
 from nrdf.process.check import check_category, known_categories
-from nrdf.process.knowledge import Kind, Knowledge
+from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import validated
+from nrdf.process.process import Kind
 from nrdf.regions.files import read_regions
 
 log = logging.getLogger(__name__)

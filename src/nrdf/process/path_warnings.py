@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nrdf.geometry.units import readable
-from nrdf.process.knowledge import Process
+from nrdf.process.process import Process
 from nrdf.toolpath.metrics import NO_CLEARANCE, ToolPathMetrics
 
 _MOST_UNREACHED = 0.03

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nrdf.process.knowledge import Process
-from nrdf.toolpath.strategy import Strategy
+from nrdf.process.process import Process
+from nrdf.toolpath.strategy import LARGEST_TURN_RAD_M, Strategy
 from nrdf.toolpath.types import Segment, ToolPath
 
 
@@ -39,6 +39,22 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         retract_distance_m=process.retract.distance_m,
         retract_angle_rad=process.retract.angle_rad,
         retract_feed_m_s=process.retract.feed_m_s,
+        direction_mode=process.direction_mode or "taught",
+        start=process.start,
+        line_order=process.order_of_lines,
+        heading=process.heading,
+        run_off_m=process.run_off_m,
+        run_off_height_m=process.run_off_height_m,
+        lead_in_radius_m=process.lead_in_radius_m,
+        lead_out_radius_m=process.lead_out_radius_m,
+        offset_m=process.offset_m,
+        drag_m=process.drag_m,
+        edge_contact_m=process.edge_contact_m,
+        largest_turn_rad_m=process.largest_turn_rad_m or LARGEST_TURN_RAD_M,
+        chord_error_m=process.chord_error_m,
+        minimum_length_m=process.minimum_length_m,
+        join_gap_m=process.join_gap_m,
+        constant_speed=process.constant_speed,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import z_axes
 from nrdf.geometry.units import readable
-from nrdf.process.knowledge import Process, TaughtSegment
+from nrdf.process.process import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions, travel_directions

@@ -36,7 +36,7 @@ from nrdf.process.bound_knowledge import (
     unit_and_warnings,
 )
 from nrdf.process.correspondence import Correspondence, ReferenceSurface
-from nrdf.process.knowledge import Process, TaughtSegment
+from nrdf.process.process import Process, TaughtSegment
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught_paths import contact_points, taught_segments
 from nrdf.process.transfer_result import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
-from nrdf.process.knowledge import Process, TransferMode
+from nrdf.process.process import Process, TransferMode
 from nrdf.regions.match import Match
 from nrdf.scans.kind_check import KindCheck
 from nrdf.toolpath.metrics import ToolPathMetrics

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from nrdf.process.knowledge import Process
 from nrdf.process.limits import Limits, strict_warnings
 from nrdf.process.path_warnings import path_warnings
+from nrdf.process.process import Process
 from nrdf.process.transfer_result import PathResult, TransferResult
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.metrics import REASONS

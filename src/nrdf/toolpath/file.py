@@ -22,12 +22,20 @@ from nrdf.geometry.similarity import Similarity
 from nrdf.io.atomic import write_atomically
 from nrdf.io.files import read_file, require_file
 from nrdf.io.schema import Location, StrictModel, validation_messages
-from nrdf.toolpath.strategy import Strategy, Trajectory
+from nrdf.toolpath.strategy import (
+    LARGEST_TURN_RAD_M,
+    DirectionMode,
+    Heading,
+    LineOrder,
+    Start,
+    Strategy,
+    Trajectory,
+)
 from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
-VERSION = 3
+VERSION = 4
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
-strategy."""
+strategy; since 4 that has the settings of modifiers."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -180,6 +188,23 @@ class _StrategyContent(StrictModel):
     retract_distance_m: float
     retract_angle_rad: float
     retract_feed_m_s: float
+    # Since version 4, so with the values that earlier paths were made with.
+    direction_mode: DirectionMode = "taught"
+    start: Start | None = None
+    line_order: LineOrder = "snake"
+    heading: Heading = "travel"
+    run_off_m: float = 0.0
+    run_off_height_m: float = 0.0
+    lead_in_radius_m: float = 0.0
+    lead_out_radius_m: float = 0.0
+    offset_m: float = 0.0
+    drag_m: float = 0.0
+    edge_contact_m: float = 0.0
+    largest_turn_rad_m: float = LARGEST_TURN_RAD_M
+    chord_error_m: float = 0.0
+    minimum_length_m: float | None = None
+    join_gap_m: float | None = None
+    constant_speed: bool = False
 
     def made(self, where: str) -> Strategy:
         content = {name: getattr(self, name) for name in type(self).model_fields}

@@ -11,9 +11,10 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.geometry.units import OTHER_UNITS, to_si
 from nrdf.process.bound_knowledge import BoundKnowledge, checksum, overlaps, resolve
-from nrdf.process.knowledge import Knowledge, Process, Trajectory
+from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import validated
 from nrdf.process.new_knowledge import DEFAULTS
+from nrdf.process.process import Process, Trajectory
 from nrdf.studio.model.document import Document, PaintedRegion
 
 PATTERNS = tuple(name for name in get_args(Trajectory) if name != "taught")

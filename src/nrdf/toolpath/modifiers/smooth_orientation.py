@@ -10,10 +10,9 @@ import numpy as np
 from nrdf.geometry.frames import angles_between, unit_vectors
 from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.modifiers.split import LEAST_STEP_M, cut, turns
+from nrdf.toolpath.strategy import LARGEST_TURN_RAD_M
 from nrdf.toolpath.surface_path import SurfacePath
 
-LARGEST_TURN_RAD_M = float(np.radians(3.0)) * 1e3
-"""3° a mm."""
 LARGEST_TILT_RAD = float(np.radians(35.0))
 _ROUNDS, _CLOSE = 400, 1e-3  # of the relaxation, and the share of the limit that is left over
 
