@@ -6,7 +6,8 @@ import numpy as np
 
 from nrdf.geometry.units import readable
 from nrdf.process.process import Process
-from nrdf.toolpath.metrics import NO_CLEARANCE, ToolPathMetrics
+from nrdf.toolpath.metrics import ToolPathMetrics
+from nrdf.toolpath.region_samples import NO_CLEARANCE
 
 _MOST_UNREACHED = 0.03
 _LARGEST_STEP = 2.0  # times the spacing of waypoints

@@ -12,7 +12,7 @@ from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
 from nrdf.process.transfer_result import PathResult, TransferResult
 from nrdf.toolpath.file import pose_to_dict
-from nrdf.toolpath.metrics import REASONS
+from nrdf.toolpath.region_samples import REASONS
 
 METRIC_COLUMNS = (
     "worked · left out · unreached", "overlap", "line spacing, mean · worst",

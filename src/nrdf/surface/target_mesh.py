@@ -134,6 +134,21 @@ class TargetMesh:
         squared, face, places = tree.squared_distance(self.vertices, faces, points)
         return np.array(squared), chosen[np.asarray(face)], np.array(places)
 
+    def first_hits(
+        self, starts: np.ndarray, directions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Where rays from starts (m, 3), m, along unit directions (m, 3) first meet the mesh: the
+        distances (m,), m, infinite for none, and the faces (m,), -1 for none."""
+        if not len(starts):
+            return np.zeros(0), np.zeros(0, np.int64)
+        self._nearest_of_side(starts[:1], -1)
+        tree, _, faces = self._found[-1]
+        starts = np.ascontiguousarray(starts, dtype=np.float64)
+        directions = np.ascontiguousarray(directions, dtype=np.float64)
+        face, far, _ = tree.intersect_ray_first(self.vertices, faces, starts, directions)
+        face = np.asarray(face)
+        return np.where(face < 0, np.inf, np.asarray(far)), face
+
     def smooth_normals(self, points: np.ndarray, faces: np.ndarray, radius_m: float) -> np.ndarray:
         """Outward unit normals (m, 3) at points (m, 3), m, on `faces` (m,): what a flat tool feels.
 

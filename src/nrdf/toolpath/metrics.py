@@ -15,30 +15,13 @@ from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
+from nrdf.toolpath.region_samples import MARGIN, NO_CLEARANCE, Coverage
 from nrdf.toolpath.sampled_path import SampledPath, line_spacing
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 
 _SHORTEST_M = 1e-3
 _COMPARED_M = 0.003  # between the places that are compared with the object as given
-
-NO_CLEARANCE, MARGIN = "no_clearance", "edge_margin"
-REASONS = {NO_CLEARANCE: "no clearance for the tool", MARGIN: "edge margin"}
-"""Why a part of a region is left out, in words."""
-
-
-@dataclass(frozen=True)
-class Coverage:
-    """What becomes of a whole region, in shares [0, 1] of its points that add up to 1.
-
-    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_clearance, where less than
-    the tool's clearance is free before the surface, whether the footprint reaches it or not, and
-    edge_margin, inside it and not reached. unreached: it should be worked, and is not.
-    """
-
-    worked: float
-    left_out: dict[str, float]
-    unreached: float
 
 
 @dataclass(frozen=True)

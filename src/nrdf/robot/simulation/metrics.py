@@ -16,7 +16,8 @@ from nrdf.robot.planning.reachability import Reachability
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import Coverage, RegionPoints
+from nrdf.toolpath.metrics import RegionPoints
+from nrdf.toolpath.region_samples import Coverage
 from nrdf.toolpath.sampled_path import reached_points
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import SegmentGroup, ToolPath

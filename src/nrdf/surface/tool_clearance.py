@@ -1,0 +1,93 @@
+"""Where a tool has its clearance before an object's mesh, and regions without the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.units import readable
+from nrdf.geometry.winding import mesh_winding_numbers
+from nrdf.surface.mesh_cut import FineMesh, bisected, cut, refine
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
+
+_OFF = 1e-5  # of the object's size, from which a ray starts before the surface
+_INSIDE = 0.5  # winding number
+_HALVINGS, _PARTS = 6, 2.0  # steps to where clearance ends; edges along the tool's radius
+_MOST_FACES = 60_000
+_INWARD = 0.02  # share of the way to the faces around, at which a vertex is looked at
+
+
+def has_clearance(
+    mesh: TargetMesh, points: np.ndarray, normals: np.ndarray, clearance_m: float
+) -> np.ndarray:
+    """Whether (m,) nothing of the object stands within `clearance_m` before points (m, 3) on it.
+
+    Looked at along the outward normals (m, 3). In a crevice between two parts, or beneath a part
+    that lies on another, there is no clearance.
+    """
+    if clearance_m <= 0.0 or not len(points):
+        return np.ones(len(points), bool)
+    off = _OFF * mesh.size
+    starts = points + off * normals
+    distances, faces = mesh.first_hits(starts, normals)
+    free = distances + off > clearance_m
+    # A face met from behind: the ray starts inside a part, unless it came in by a hole.
+    leaving = np.einsum("ma,ma->m", mesh.face_normals[faces], normals) > 0.0
+    unsure = np.flatnonzero(free & (faces >= 0) & leaving)
+    if len(unsure):
+        wound = mesh_winding_numbers(mesh.vertices, mesh.faces, starts[unsure])
+        free[unsure[wound > _INSIDE]] = False
+    return np.asarray(free)
+
+
+def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: float) -> RegionMesh:
+    """A region without the places at which the tool lacks its clearance, cut within triangles.
+
+    Raises ProcessError where that leaves nothing.
+    """
+    if clearance_m <= 0.0:
+        return region
+    own = region.mesh
+    fine = refine(
+        FineMesh(own.vertices, own.faces, np.arange(len(own.faces))),
+        tool_radius_m / _PARTS,
+        lambda middles, _: np.ones(len(middles), bool),
+        _MOST_FACES,
+    )
+    normals = TargetMesh(fine.vertices, fine.faces).vertex_normals
+
+    def free(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
+        return has_clearance(region.parent, points, outward, clearance_m)
+
+    places = _drawn_in(fine)
+    inside = free(places, normals)
+    if inside.all():
+        return region
+    if not inside.any():
+        raise ProcessError(
+            f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
+            f"{readable('clearance_m', clearance_m)} free before the surface; give less, or 0"
+        )
+
+    def crossing(ends: np.ndarray) -> np.ndarray:
+        one, other = (places[ends[:, k]] for k in (0, 1))
+        outward = unit_vectors(normals[ends[:, 0]] + normals[ends[:, 1]])
+        return bisected(one, other, lambda between: free(between, outward), _HALVINGS)
+
+    pieces, kept = cut(fine, inside, crossing)
+    left = pieces.of_faces(kept)
+    return replace(region, mesh=TargetMesh(left.vertices, left.faces, own.repairs))
+
+
+def _drawn_in(fine: FineMesh) -> np.ndarray:
+    """The vertices (v, 3), a little nearer to the middles of the faces around: those of a border
+    may lie in the plane of a wall, which a ray then meets or not by chance."""
+    corner = fine.faces.reshape(-1)
+    count = np.maximum(np.bincount(corner, minlength=len(fine.vertices)), 1)
+    middles = np.repeat(fine.middles, 3, axis=0)
+    sums = [np.bincount(corner, middles[:, a], len(fine.vertices)) for a in range(3)]
+    return fine.vertices + _INWARD * (np.stack(sums, axis=1) / count[:, None] - fine.vertices)
