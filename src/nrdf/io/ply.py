@@ -268,12 +268,30 @@ def write_ply(path: Path, columns: Mapping[str, np.ndarray], comments: list[str]
     table = np.empty(rows, dtype=layout)
     for name, column in columns.items():
         table[name] = column
-    lines = [
-        "ply",
-        "format binary_little_endian 1.0",
-        *(f"comment {' '.join(c.split())}" for c in comments),
-    ]
-    lines.append(f"element vertex {rows}")
+    lines = [f"element vertex {rows}"]
     lines += [f"property {names[kind[1:]]} {name}" for name, kind in layout]
-    header = ("\n".join([*lines, "end_header"]) + "\n").encode("ascii", errors="replace")
-    write_atomically(path, [header, table.data if rows else b""])
+    write_atomically(path, [_binary_header(lines, comments), table.data if rows else b""])
+
+
+def write_ply_mesh(
+    path: Path, vertices: np.ndarray, faces: np.ndarray, comments: list[str]
+) -> None:
+    """Write triangles, vertices (v, 3) and faces (f, 3), as `write_ply` does; coordinates keep all
+    their digits."""
+    rows = np.empty(len(faces), dtype=[("count", "u1"), ("corners", "<i4", (3,))])
+    rows["count"], rows["corners"] = 3, faces
+    lines = [
+        f"element vertex {len(vertices)}",
+        *(f"property double {name}" for name in "xyz"),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+    ]
+    places = np.ascontiguousarray(vertices, dtype="<f8")
+    parts = [part.tobytes() for part in (places, rows) if len(part)]
+    write_atomically(path, [_binary_header(lines, comments), *parts])
+
+
+def _binary_header(lines: list[str], comments: list[str]) -> bytes:
+    said = [f"comment {' '.join(c.split())}" for c in comments]
+    every = ["ply", "format binary_little_endian 1.0", *said, *lines, "end_header"]
+    return ("\n".join(every) + "\n").encode("ascii", errors="replace")
