@@ -44,10 +44,10 @@ def test_other_programs_and_nrdf_itself_can_read_the_surface(tmp_path):
 
 
 def test_a_folder_without_meshes_or_with_a_damaged_one_is_refused(tmp_path):
-    with pytest.raises(ProcessError, match="has no surface.ply.*transfer it again"):
+    with pytest.raises(ProcessError, match=r"has no surface\.ply.*transfer it again"):
         read_job_meshes(tmp_path)
     write_job_meshes(tmp_path, *block())
     whole = (tmp_path / SURFACE).read_bytes()
     (tmp_path / SURFACE).write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(ProcessError, match="surface.ply.*transfer the job again"):
+    with pytest.raises(ProcessError, match=r"surface\.ply.*transfer the job again"):
         read_job_meshes(tmp_path)
