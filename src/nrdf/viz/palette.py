@@ -22,6 +22,10 @@ PALE = 0.55
 """Share of a region's colour, the rest white, where lines are drawn on the region."""
 DEEP = 0.55
 """Share of a region's colour, the rest black, in the lines on it."""
+AIR_MOVES = (0.52, 0.55, 0.62)
+"""A tool's ways through the air."""
+INSIDE = (0.58, 0.60, 0.63)
+"""The back of an open mesh's triangles."""
 
 COVERED, NOT_COVERED = (0.10, 0.62, 0.35), (0.84, 0.25, 0.15)
 LEFT_OUT = (0.93, 0.70, 0.20)

@@ -1,4 +1,11 @@
-"""Pictures of point clouds with their regions and the lines on them, for a person to look at."""
+"""Pictures of clouds and meshes with their regions and the lines on them, for a person to look at.
+
+A mesh with its regions and tool paths:
+
+    panel = Panel.of_mesh("chair", target, {"seat": seat.mesh}, lines={"seat": strokes})
+    draw_regions([panel], "picture.png", size=900)
+    close = render_details(panel, ["seat"], size=600)  # each region from its own side
+"""
 
 from __future__ import annotations
 
@@ -14,11 +21,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
 from nrdf.io.atomic import write_atomically
+from nrdf.viz.mesh_render import MeshScene, Triangles
 from nrdf.viz.palette import DEEP, NO_REGION, PALE, region_colours
-from nrdf.viz.render import FRONT, Camera, Scene, SurfaceLines, render
+from nrdf.viz.render import Scene, SurfaceLines
+from nrdf.viz.view import FRONT, Camera
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +52,8 @@ class Panel:
     points: (n, 3), any unit, +X forward, +Y up; normals: (n, 3) outward, or None to estimate them;
     regions: name to indices (k,) or boolean mask (n,); note: a line under the title. lines: name of
     a region to lines (k, 3) on it, such as a tool's; its colour is paler then, and theirs deep.
+    With `mesh` that is drawn, not the points, and of each region its mesh in `region_meshes`; moves
+    are ways (k, 3) through the air. All are in the points' frame and unit.
     """
 
     title: str
@@ -50,6 +62,33 @@ class Panel:
     regions: Mapping[str, np.ndarray] = field(default_factory=dict)
     note: str = ""
     lines: Mapping[str, Sequence[np.ndarray]] = field(default_factory=dict)
+    mesh: Triangles | None = None
+    region_meshes: Mapping[str, Triangles] = field(default_factory=dict)
+    moves: Sequence[np.ndarray] = ()
+
+    @staticmethod
+    def of_mesh(
+        title: str,
+        mesh: Triangles,
+        regions: Mapping[str, Triangles] | None = None,
+        lines: Mapping[str, Sequence[np.ndarray]] | None = None,
+        moves: Sequence[np.ndarray] = (),
+        note: str = "",
+    ) -> Panel:
+        """A mesh, with the meshes of its regions (cut out of it), tool paths on them, and moves.
+
+        What is a mesh has vertices and faces: a `TargetMesh`, a `RegionMesh`'s `mesh`, a `Mesh`. A
+        region's lines (k, 3) are contacts of the tool. What other surface hides is not drawn.
+        """
+        return Panel(
+            title, np.asarray(mesh.vertices), note=note, lines=lines or {}, mesh=mesh,
+            region_meshes=regions or {}, moves=moves,
+        )  # fmt: skip
+
+    @property
+    def names(self) -> list[str]:
+        """All regions that it shows."""
+        return list(dict.fromkeys((*self.regions, *self.region_meshes, *self.lines)))
 
 
 def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> None:
@@ -72,7 +111,7 @@ def render_panels(
 
     One row a view, in it an array (h, size, 3) in [0, 1] for each panel, all of the same scale.
     """
-    names = list(dict.fromkeys(n for panel in panels for n in (*panel.regions, *panel.lines)))
+    names = list(dict.fromkeys(name for panel in panels for name in panel.names))
     colours = region_colours(names)
     drawn = [_prepare(panel, names) for panel in panels]
     hidden = _hidden_regions(drawn, len(names))
@@ -85,7 +124,7 @@ def render_panels(
 def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, np.ndarray]:
     """Close pictures (size, size, 3) in [0, 1] of some of a panel's regions, each from its side
     and with its own lines."""
-    every = list(dict.fromkeys((*panel.regions, *panel.lines)))
+    every = panel.names
     table, pale = _fills(region_colours(every))
     scene = _prepare(panel, every)
 
@@ -101,7 +140,7 @@ def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, n
         near = ((view[:, :2] > corner - 0.05) & (view[:, :2] < corner + side + 0.05)).all(axis=1)
         colours = pale if scene.lines else table
         drawn = scene.select(near, every.index(name))
-        return render(drawn, axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
+        return drawn.render(axes, corner, size / side, (size, size), colours, DEEP * table)[::-1]
 
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         return dict(zip(names, pool.map(draw, names), strict=True))
@@ -114,7 +153,26 @@ def _fills(colours: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return table, np.array([*(PALE * table[:-1] + (1 - PALE)), NO_REGION])
 
 
-def _prepare(panel: Panel, names: list[str]) -> Scene:
+def _prepare(panel: Panel, names: list[str]) -> Scene | MeshScene:
+    return _prepare_cloud(panel, names) if panel.mesh is None else _prepare_mesh(panel, names)
+
+
+def _prepare_mesh(panel: Panel, names: list[str]) -> MeshScene:
+    assert panel.mesh is not None
+    centre, scale = canonical_transform(np.asarray(panel.mesh.vertices))
+
+    def moved(mesh: Triangles) -> Mesh:
+        return Mesh((np.asarray(mesh.vertices) - centre) / scale, np.asarray(mesh.faces))
+
+    def ways(lines: Sequence[np.ndarray]) -> list[np.ndarray]:
+        return [(np.asarray(line) - centre) / scale for line in lines if len(line)]
+
+    regions = [(names.index(name), moved(mesh)) for name, mesh in panel.region_meshes.items()]
+    lines = {names.index(name): ways(own) for name, own in panel.lines.items()}
+    return MeshScene.of(moved(panel.mesh), regions, lines, ways(panel.moves))
+
+
+def _prepare_cloud(panel: Panel, names: list[str]) -> Scene:
     points = np.asarray(panel.points, np.float64)
     region = np.full(len(points), -1)
     # Where regions overlap, the one listed last is on top.
@@ -142,7 +200,7 @@ def _prepare(panel: Panel, names: list[str]) -> Scene:
 
 
 def _row(
-    drawn: list[Scene], colours: dict[str, np.ndarray], camera: Camera, size: int
+    drawn: Sequence[Scene | MeshScene], colours: dict[str, np.ndarray], camera: Camera, size: int
 ) -> list[np.ndarray]:
     """Pictures (h, size, 3), all of the same height and scale, of prepared clouds."""
     axes = camera.axes()
@@ -153,12 +211,12 @@ def _row(
     shape = (int(np.ceil(pixels * (high[1] - low[1]))), size)
     table, pale = _fills(colours)
 
-    def draw(cloud: Scene, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    def draw(cloud: Scene | MeshScene, corner: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         first = np.maximum(np.floor((corner[0] - _MARGIN - low) * pixels).astype(int), 0)
         last = np.minimum(np.ceil((corner[1] + _MARGIN - low) * pixels).astype(int), shape[::-1])
         canvas = np.ones((*shape, 3), np.float32)
-        canvas[first[1] : last[1], first[0] : last[0]] = render(
-            cloud, axes, low + first / pixels, pixels, tuple((last - first)[::-1]),
+        canvas[first[1] : last[1], first[0] : last[0]] = cloud.render(
+            axes, low + first / pixels, pixels, tuple((last - first)[::-1]),
             pale if cloud.lines else table, DEEP * table,
         )  # fmt: skip
         return canvas[::-1]
@@ -167,16 +225,16 @@ def _row(
         return list(pool.map(draw, drawn, corners))
 
 
-def _hidden_regions(drawn: list[Scene], count: int) -> list[int]:
+def _hidden_regions(drawn: Sequence[Scene | MeshScene], count: int) -> list[int]:
     """Regions of which less than a quarter of the points can be seen from the front."""
     return [i for i in range(count) if _facing(drawn, i, FRONT) < 0.25]
 
 
-def _best_side(drawn: list[Scene], hidden: list[int]) -> Camera:
+def _best_side(drawn: Sequence[Scene | MeshScene], hidden: list[int]) -> Camera:
     return max(OTHER_SIDES, key=lambda c: sum(min(_facing(drawn, i, c), 0.4) for i in hidden))
 
 
-def _facing(drawn: list[Scene], region: int, camera: Camera) -> float:
+def _facing(drawn: Sequence[Scene | MeshScene], region: int, camera: Camera) -> float:
     """Share of a region's points, over all clouds, that face the camera; 1 if there are none."""
     toward = camera.axes()[2]
     normals = np.concatenate([cloud.normals[cloud.region == region] for cloud in drawn])

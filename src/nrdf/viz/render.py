@@ -14,37 +14,10 @@ import numpy as np
 from scipy import ndimage
 
 from nrdf.geometry.polylines import resample
+from nrdf.viz.view import OVERSAMPLING, eye_dome, reduced
 
-_OVERSAMPLING = 2
 _LINE, _DOT = 1.6, 5.0  # radius of a line, and of the dot at its beginning, in fine pixels
 _SUNK = 0.015  # canonical depth by which a line may lie in the surface and still be drawn on it
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Orthographic view: `azimuth` (rad) about +Y from +X towards +Z, `elevation` (rad)."""
-
-    azimuth: float
-    elevation: float
-
-    def axes(self) -> np.ndarray:
-        """Rows right, up, towards the viewer, each a unit vector: (3, 3)."""
-        a, e = self.azimuth, self.elevation
-        toward = np.array([np.cos(e) * np.cos(a), np.sin(e), np.cos(e) * np.sin(a)])
-        right = np.array([np.sin(a), 0.0, -np.cos(a)])
-        return np.stack([right, np.cross(toward, right), toward])
-
-    @staticmethod
-    def towards(normal: np.ndarray) -> Camera:
-        """A view that sees a surface with this normal (3,) well, and somewhat from the front."""
-        length = float(np.linalg.norm(normal))
-        looked = 0.35 * FRONT.axes()[2] + (normal / length if length > 0.1 else 0.0)
-        flat = float(np.hypot(looked[0], looked[2]))
-        azimuth = float(np.arctan2(looked[2], looked[0])) if flat > 1e-6 else FRONT.azimuth
-        return Camera(azimuth, float(np.clip(np.arctan2(looked[1], flat), -1.2, 1.2)))
-
-
-FRONT = Camera(0.65, 0.38)
 
 
 @dataclass(frozen=True)
@@ -71,46 +44,43 @@ class Scene:
         kept = (self.points[mask], self.normals[mask], self.region[mask], self.radius[mask])
         return Scene(*kept, tuple(lines for lines in self.lines if lines.region == region))
 
+    def render(
+        self,
+        axes: np.ndarray,
+        corner: np.ndarray,
+        pixels: float,
+        shape: tuple[int, int],
+        table: np.ndarray,
+        line_colours: np.ndarray,
+    ) -> np.ndarray:
+        """The cloud on white, (h, w, 3) in [0, 1] with the lowest row first, h and w by `shape`.
 
-def render(
-    cloud: Scene,
-    axes: np.ndarray,
-    corner: np.ndarray,
-    pixels: float,
-    shape: tuple[int, int],
-    table: np.ndarray,
-    line_colours: np.ndarray,
-) -> np.ndarray:
-    """One cloud on white, (h, w, 3) in [0, 1] with the lowest row first, h and w by `shape`.
+        axes: rows right, up, towards the viewer (3, 3). `corner` (2,) is the place of the first
+        pixel's corner, `pixels` their number per unit length. table: a colour for each region, the
+        last for none; line_colours: the same for lines.
+        """
+        shape, pixels = (OVERSAMPLING * shape[0], OVERSAMPLING * shape[1]), OVERSAMPLING * pixels
+        front = np.flatnonzero(self.normals @ axes[2] > 0.0)
+        owner, depth = _splat(self, front, axes, corner, pixels, shape)
+        spacing = float(np.median(self.radius)) * pixels
+        owner, depth = _close_pinholes(owner, depth, int(2.0 * spacing) | 1, 4.0 * spacing / pixels)
+        # A little blur of the outline takes off the discs' roundness.
+        cover = ndimage.gaussian_filter((owner >= 0).astype(np.float32), 0.35 * spacing)
+        painted = (owner >= 0) & (cover > 0.5)
 
-    axes: rows right, up, towards the viewer (3, 3). `corner` (2,) is the place of the first pixel's
-    corner, `pixels` their number per unit length. table: a colour for each region's number, the
-    last for none; line_colours: the same for lines.
-    """
-    shape, pixels = (_OVERSAMPLING * shape[0], _OVERSAMPLING * shape[1]), _OVERSAMPLING * pixels
-    front = np.flatnonzero(cloud.normals @ axes[2] > 0.0)
-    owner, depth = _splat(cloud, front, axes, corner, pixels, shape)
-    spacing = float(np.median(cloud.radius)) * pixels
-    owner, depth = _close_pinholes(owner, depth, int(2.0 * spacing) | 1, 4.0 * spacing / pixels)
-    # A little blur of the outline takes off the discs' roundness.
-    cover = ndimage.gaussian_filter((owner >= 0).astype(np.float32), 0.35 * spacing)
-    painted = (owner >= 0) & (cover > 0.5)
-
-    light = np.array([-0.35, 0.75, 0.6]) @ axes
-    lit = cloud.normals @ (light / np.linalg.norm(light))
-    shade = 0.62 + 0.38 * np.clip(0.5 + 0.5 * lit, 0.0, 1.0) ** 1.2
-    colour = (table[cloud.region] * shade[:, None]).astype(np.float32)
-    image = np.ones((*shape, 3), np.float32)
-    image[painted] = colour[owner[painted]]
-    image *= _eye_dome(np.where(painted, depth, np.float32(-1.5)), _OVERSAMPLING)[..., None]
-    for lines in cloud.lines:
-        # A line may dip into its own region, but does not shine through a thin part's other side.
-        own = (owner >= 0) & (cloud.region[owner] == lines.region)
-        cover = depth - np.where(own, np.float32(_SUNK), np.float32(0.0))
-        _paint(image, cover, lines.lines, line_colours[lines.region], axes, corner, pixels)
-    steps = range(_OVERSAMPLING)
-    parts = [image[i::_OVERSAMPLING, j::_OVERSAMPLING] for i in steps for j in steps]
-    return np.clip(np.add.reduce(parts) / np.float32(len(parts)), 0.0, 1.0)
+        light = np.array([-0.35, 0.75, 0.6]) @ axes
+        lit = self.normals @ (light / np.linalg.norm(light))
+        shade = 0.62 + 0.38 * np.clip(0.5 + 0.5 * lit, 0.0, 1.0) ** 1.2
+        colour = (table[self.region] * shade[:, None]).astype(np.float32)
+        image = np.ones((*shape, 3), np.float32)
+        image[painted] = colour[owner[painted]]
+        image *= eye_dome(np.where(painted, depth, np.float32(-1.5)), OVERSAMPLING)[..., None]
+        for lines in self.lines:
+            # A line may dip into its own region, but not shine through a thin part.
+            own = (owner >= 0) & (self.region[owner] == lines.region)
+            cover = depth - np.where(own, np.float32(_SUNK), np.float32(0.0))
+            _paint(image, cover, lines.lines, line_colours[lines.region], axes, corner, pixels)
+        return reduced(image)
 
 
 def _splat(
@@ -198,15 +168,3 @@ def _close_pinholes(
     owner, depth = owner.copy(), depth.copy()
     owner[hole], depth[hole] = owner[source], closed[hole]
     return owner, depth
-
-
-def _eye_dome(depth: np.ndarray, reach: int) -> np.ndarray:
-    """Factor in (0, 1] that darkens pixels just behind a nearer neighbour."""
-    # The background is far behind, but its own pixels stay white.
-    background = depth <= -1.5
-    total = np.zeros_like(depth)
-    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-        for r in (reach, 2 * reach):
-            shifted = np.roll(depth, (r * dy, r * dx), axis=(0, 1))
-            total += np.clip(shifted - depth - np.float32(0.006), 0.0, np.float32(0.12))
-    return np.where(background, 1.0, np.exp(-1.6 * total))
