@@ -1,4 +1,4 @@
-"""Regions of simple shapes whose distances are known: plate, plate with a hole, tube, cap, bend."""
+"""Regions of simple shapes whose distances are known: plates, boxes, tubes, bends."""
 
 from __future__ import annotations
 
@@ -51,6 +51,50 @@ def disc(radius: float = 0.1) -> RegionMesh:
         return np.stack([radius * v * np.cos(angle), radius * v * np.sin(angle), 0 * u], axis=1)
 
     return flipped(sheet(place, 10, 64))
+
+
+def box(width: float = 0.4, depth: float = 0.2, height: float = 0.03) -> RegionMesh:
+    """A box around the origin, in twelve triangles."""
+    corner = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    # fmt: off
+    faces = np.array([(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
+                      (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)])
+    # fmt: on
+    mesh = TargetMesh(corner * (width, depth, height), faces, ())
+    return RegionMesh.from_faces(mesh, np.ones(len(faces), bool))
+
+
+def cushion(width: float = 0.4, depth: float = 0.3, height: float = 0.08) -> RegionMesh:
+    """A closed body without an edge: an ellipsoid, z up."""
+
+    def place(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        around, polar = 2.0 * np.pi * u, np.pi * v
+        place = np.stack(
+            [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=1
+        )
+        return 0.5 * place * (width, depth, height)
+
+    return flipped(sheet(place, 32, 64))
+
+
+def ring(radius: float = 0.2, height: float = 0.02) -> RegionMesh:
+    """The edge of a round plate, outward, z up."""
+
+    def place(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        angle = 2.0 * np.pi * u
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), height * v], axis=1)
+
+    return sheet(place, 2, 96)
+
+
+def arch(radius: float = 0.3, width: float = 0.05, turn: float = np.pi / 2) -> RegionMesh:
+    """A flat bent strip, z up."""
+
+    def place(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        far, angle = radius + width * (u - 0.5), turn * v
+        return np.stack([far * np.cos(angle), far * np.sin(angle), 0 * u], axis=1)
+
+    return sheet(place, 48, 4)
 
 
 def tube(radius: float = 0.03, length: float = 0.4, share: float = 1.0) -> RegionMesh:

@@ -33,9 +33,9 @@ def distance_from(mesh: FineMesh, seeds: np.ndarray, rounds: int = _ROUNDS) -> n
     start[seeds] = 1.0
     inner = csc_matrix(heat[free][:, free])
     warmth = start.copy()
-    warmth[free] = _factor(inner).solve(-(heat[free] @ start))
+    warmth[free] = factor(inner).solve(-(heat[free] @ start))
     wanted = -_unit(mesh.slopes(warmth))
-    solver = _factor(csc_matrix(mesh.stiffness[free][:, free]))
+    solver = factor(csc_matrix(mesh.stiffness[free][:, free]))
     for _ in range(rounds):
         values[free] = solver.solve(mesh.divergence(wanted)[free])
         wanted = _unit(mesh.slopes(values))
@@ -79,7 +79,7 @@ def signed_distance(mesh: FineMesh, side: np.ndarray, rounds: int = _ROUNDS) -> 
         weight = 0.5 * (np.append(length, 0.0) + np.insert(length, 0, 0.0))
         np.add.at(source, line.corners[:, 0], weight * (1.0 - line.share))
         np.add.at(source, line.corners[:, 1], weight * line.share)
-    warmth = _factor(_heat(mesh)).solve(source)
+    warmth = factor(_heat(mesh)).solve(source)
     wanted = -_unit(mesh.slopes(warmth))
     corner = side[mesh.faces]
     wanted[(corner < 0.0).all(axis=1)] *= -1.0
@@ -96,7 +96,7 @@ def even_field(mesh: FineMesh, wanted: np.ndarray, rounds: int) -> np.ndarray:
     """
     # A little mass keeps the matrix, which knows no constant, regular.
     small = 1e-9 / max(float(mesh.areas.sum()), 1e-300)
-    solver = _factor(csc_matrix(mesh.stiffness + diags(small * mesh.mass)))
+    solver = factor(csc_matrix(mesh.stiffness + diags(small * mesh.mass)))
     values = np.zeros(len(mesh.vertices))
     for _ in range(rounds):
         values = solver.solve(mesh.divergence(wanted))
@@ -110,7 +110,8 @@ def _heat(mesh: FineMesh) -> csc_matrix:
     return csc_matrix(diags(mesh.mass) + step**2 * mesh.stiffness)
 
 
-def _factor(matrix: csc_matrix) -> SuperLU:
+def factor(matrix: csc_matrix) -> SuperLU:
+    """A symmetric positive matrix (n, n) made ready to solve with."""
     return splu(
         matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )

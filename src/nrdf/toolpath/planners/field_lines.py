@@ -23,20 +23,34 @@ _EDGE, _OPEN = 0.45, 0.3
 _SPECK = 0.5
 """Share of the footprint's area that a part must have to get a line."""
 _LEAST_SPACING = 0.9
+_SINGLE = 1.5  # radii: a part so wide is reached from its middle line
 _PIECE, _NEXT_TO = 8.0, 0.6
 """Stepovers that a short piece is long, at most, and that it is from longer lines."""
 _SPIKE = 0.001  # of the area: how far out the outermost tips of a part do not count
+_TAIL = 0.02  # of the area: what may lie beyond the reach of a single line
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a region that hangs together, in fine triangles."""
+    """A part of a region that hangs together, in fine triangles; or a sheet of one.
+
+    whole: the part that a sheet was cut from, and at: (v,) which of its vertices the sheet's are.
+    """
 
     mesh: FineMesh
+    whole: Part | None = None
+    at: np.ndarray | None = None
+
+    def sheet(self, kept: np.ndarray) -> Part:
+        """The triangles that are kept (f,) bool."""
+        return Part(self.mesh.part(kept), self, np.unique(self.mesh.faces[kept]))
 
     @cached_property
     def border_distance(self) -> np.ndarray | None:
-        """Distance (v,) along the surface from the part's border, m; None where it has none."""
+        """Distance (v,) along the surface from the region's border, m; None where it has none."""
+        if self.whole is not None:
+            distance = self.whole.border_distance
+            return distance if distance is None else distance[self.at]
         border = self.mesh.border
         return distance_from(self.mesh, border) if len(border) else None
 
@@ -76,17 +90,30 @@ def parts_of(region: RegionMesh, strategy: Strategy) -> list[Part]:
     return [Part(m) for m in meshes if float(m.areas.sum()) >= least] or [Part(meshes[0])]
 
 
-def even_levels(values: np.ndarray, weights: np.ndarray, stepover_m: float) -> np.ndarray:
+def even_levels(
+    values: np.ndarray,
+    weights: np.ndarray,
+    stepover_m: float,
+    single_m: float = 0.0,
+    more: int = 0,
+    tail: float = _SPIKE,
+) -> np.ndarray:
     """Levels (k,) of a distance (n,) for lines one stepover apart, or up to a tenth less.
 
-    The outermost lines are half a stepover from the ends at most. weights: (n,), areas.
+    The outermost lines are half a stepover from the ends at most. weights: (n,), areas. single_m:
+    up to that width one line in the middle will do. more: lines that are added, closer together.
+    tail: share of the area at either end that makes the part no wider.
     """
     order = np.argsort(values)
     share = np.cumsum(weights[order]) / float(weights.sum())
-    low, high = np.interp([_SPIKE, 1.0 - _SPIKE], share, values[order])
+    low, high = np.interp([tail, 1.0 - tail], share, values[order])
     width = float(high - low)
-    count = max(int(np.ceil(width / stepover_m - 0.02)), 1)
+    most = float(np.ptp(np.interp([_TAIL, 1.0 - _TAIL], share, values[order])))
+    count = 1 if most <= single_m else max(int(np.ceil(width / stepover_m - 0.02)), 1)
     apart = max(width / count, _LEAST_SPACING * stepover_m)
+    if more:
+        count += more
+        apart = width / count
     return 0.5 * (low + high) + apart * (np.arange(count) - 0.5 * (count - 1))
 
 
@@ -135,14 +162,21 @@ def _needed(lines: list[MeshLine], strategy: Strategy) -> list[MeshLine]:
     return [lines[k] for k in sorted(kept)]
 
 
-def lines_at(part: Part, values: np.ndarray, strategy: Strategy) -> list[MeshLine]:
-    """Lines of a distance (v,) across a part, one stepover apart, inside the margin."""
+def lines_at(
+    part: Part, values: np.ndarray, strategy: Strategy, more: int = 0, tail: float = _SPIKE
+) -> list[MeshLine]:
+    """Lines of a distance (v,) across a part, one stepover apart, inside the margin.
+
+    more: lines that are added, closer together. tail: as `even_levels` has it.
+    """
     weight, margin = part.mesh.mass, strategy.edge_margin_m
     if margin > 0.0 and part.border_distance is not None:
         weight = weight * (part.border_distance > margin)
     if not weight.any():
         return []
-    levels = even_levels(values, weight, strategy.stepover_m)
+    levels = even_levels(
+        values, weight, strategy.stepover_m, _SINGLE * strategy.tool_radius_m, more, tail
+    )
     return _needed(part.inside(level_lines(part.mesh, values, levels), margin), strategy)
 
 

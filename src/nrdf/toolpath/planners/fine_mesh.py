@@ -55,6 +55,18 @@ class FineMesh:
         pairs, of_face = self.edges
         return np.unique(pairs[np.bincount(of_face.ravel(), minlength=len(pairs)) == 1])
 
+    def border_loops(self) -> tuple[list[np.ndarray], np.ndarray]:
+        """The vertices (b,) of each border that hangs together, and the borders' lengths, m."""
+        pairs, of_face = self.edges
+        edge = pairs[np.bincount(of_face.ravel(), minlength=len(pairs)) == 1]
+        used, ends = np.unique(edge, return_inverse=True)
+        ends = ends.reshape(-1, 2)
+        linked = csr_matrix((np.ones(len(ends)), ends.T), (len(used),) * 2)
+        count, label = connected_components(linked, directed=False)
+        step = np.linalg.norm(self.vertices[edge[:, 0]] - self.vertices[edge[:, 1]], axis=1)
+        length = np.bincount(label[ends[:, 0]], step, minlength=count)
+        return [used[label == k] for k in range(count)], length
+
     @cached_property
     def stiffness(self) -> csc_matrix:
         """Cotangent matrix (v, v), positive semi-definite, as `gradient` has it."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine
-from nrdf.toolpath.planners.raster import across_directions, line_direction, usual_length
+from nrdf.toolpath.planners.sheet_lines import across_directions, line_direction, usual_length
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 

@@ -10,7 +10,7 @@ from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine, level_lines
 from nrdf.toolpath.planners.ordering import snake_order
-from nrdf.toolpath.planners.raster import raster_lines
+from nrdf.toolpath.planners.sheet_lines import sheet_lines
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -32,7 +32,7 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     found: list[SurfacePath] = []
     for part in parts_of(region, strategy):
         strokes = rod_strokes(region, part, strategy)
-        found += strokes or driven(region, part, raster_lines(region, part, strategy), strategy)
+        found += strokes or driven(region, part, sheet_lines(region, part, strategy), strategy)
     return checked(found, strategy)
 
 
