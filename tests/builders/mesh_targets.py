@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from nrdf.toolpath.planner import add_approach_retract, tool_segments
+from nrdf.toolpath.tool_segments import add_approach_retract, tool_segments
 from nrdf.toolpath.types import Segment
 from nrdf_benchmark.mesh_paths.targets import FINE, MeshTarget
 

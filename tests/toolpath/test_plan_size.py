@@ -13,8 +13,9 @@ from nrdf.process.check import check_knowledge
 from nrdf.surface import surface as surface_module
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
-from nrdf.toolpath.plan_size import MOST_LINES, MOST_WAYPOINTS, check_passes, estimate_size
+from nrdf.toolpath.plan_size import estimate_size
 from nrdf.toolpath.planner import plan
+from nrdf.toolpath.size_limits import MOST_LINES, MOST_WAYPOINTS, check_passes
 from nrdf.toolpath.strategy import Strategy
 
 

@@ -13,8 +13,9 @@ from nrdf.errors import ProcessError
 from nrdf.shapes.families import get_family
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import measure_path
-from nrdf.toolpath.planner import add_approach_retract, plan
+from nrdf.toolpath.planner import plan
 from nrdf.toolpath.strategy import TRAJECTORIES, Strategy
+from nrdf.toolpath.tool_segments import add_approach_retract
 from nrdf.toolpath.types import Segment
 
 STRATEGY = Strategy(stepover_m=0.025, spacing_m=0.01, tool_radius_m=0.025)
@@ -165,10 +166,10 @@ def test_approach_and_retract_follow_distance_angle_and_feed():
     assert (approach.dwell_s, work.dwell_s, retract.dwell_s) == (0.0, 0.7, 0.0)
     ahead, up = frames(work)[0, :, 0], np.array([0.0, 0.0, 1.0])
     coming = approach.positions[0] - work.positions[0]
-    np.testing.assert_allclose(coming, 0.03 * (np.cos(0.5) * up - np.sin(0.5) * ahead), atol=1e-6)
+    np.testing.assert_allclose(coming, 0.03 * (np.cos(0.5) * up - np.sin(0.5) * ahead), atol=1e-4)
     np.testing.assert_array_equal(approach.positions[1], work.positions[0])
     going = retract.positions[1] - work.positions[-1]
-    np.testing.assert_allclose(going, 0.02 * frames(work)[-1, :, 0], atol=1e-6)
+    np.testing.assert_allclose(going, 0.02 * frames(work)[-1, :, 0], atol=1e-4)
     bare = planned(*board(), approach_distance_m=0.0, retract_distance_m=0.0)
     assert {segment.kind for segment in bare} == {"process"}
 
@@ -219,7 +220,7 @@ def test_what_does_not_fit_the_region_is_explained(trajectory, changes, message)
         ({"passes": 0}, "passes is 0; give a value above 0"),
         ({"standoff_m": -0.1}, "standoff_m is -0.1; give 0 or more"),
         ({"direction": np.zeros(3)}, "give 3 numbers, not all 0"),
-        ({"trajectory": "zigzag"}, "no trajectory 'zigzag'; known: raster, cross-hatch, spiral"),
+        ({"trajectory": "zigzag"}, "no trajectory 'zigzag'; known: raster, plane-slices"),
     ],
 )
 def test_values_out_of_range_are_refused_by_name(changes, message):

@@ -23,7 +23,8 @@ from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals
 from nrdf.surface.patch import patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
-from nrdf.toolpath.planner import add_approach_retract, plan
+from nrdf.toolpath.planner import plan
+from nrdf.toolpath.tool_segments import add_approach_retract
 from nrdf.toolpath.types import Segment
 
 

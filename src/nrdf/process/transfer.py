@@ -55,7 +55,8 @@ from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.mesh_projection import on_mesh, target_mesh_of
 from nrdf.toolpath.metrics import measure_path
-from nrdf.toolpath.planner import add_approach_retract, plan
+from nrdf.toolpath.planner import plan
+from nrdf.toolpath.tool_segments import add_approach_retract
 from nrdf.toolpath.types import Segment
 
 log = logging.getLogger(__name__)
@@ -101,8 +102,7 @@ class ProcessTransfer:
 
         Args:
             target: what `nrdf.as_cloud` takes (a PointCloud, a path, an array (n, 3), a mesh), in
-            the
-                category's orientation, or an EncodedCloud in any pose, in metres.
+                the category's orientation, or an EncodedCloud in any pose, in metres.
             unit: of the target, where its file did not say.
             min_confidence: a region that is found nowhere, or with less mean confidence, is
             skipped.

@@ -3,18 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.toolpath.modifiers import join, order_nearest, smooth_orientation, split
-from nrdf.toolpath.planner import add_approach_retract, tool_segments
+from nrdf.surface.target_mesh import TargetMesh
+from nrdf.surface.tool_clearance import accessible_region
+from nrdf.toolpath.line_direction import line_axes, with_direction
+from nrdf.toolpath.modifiers import (
+    chord_error,
+    drag,
+    edge_contact,
+    join,
+    minimum_length,
+    offset,
+    one_way,
+    order_shortest,
+    run_off,
+    smooth_orientation,
+    split,
+    start_at,
+)
+from nrdf.toolpath.modifiers.join import Project
+from nrdf.toolpath.modifiers.run_off import Free
 from nrdf.toolpath.planners import PLANNERS, Planner
+from nrdf.toolpath.region_samples import sample_evenly
+from nrdf.toolpath.size_limits import check_passes, check_size
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
+from nrdf.toolpath.tool_segments import add_approach_retract, steady_tool_segments
 from nrdf.toolpath.types import Segment
 
-_LARGEST_STEP, _LARGEST_GAP = 2.0, 2.0  # spacings inside a line; stepovers that joined ones are
+_LARGEST_STEP = 2.0  # spacings inside a line
+_PER_RADIUS = 4.0  # samples of a region along the tool's radius
+_NEEDED, _LOST = 0.02, 0.001
+"""Shares of a region that a short line must reach alone to stay, and that all that go may have
+reached alone."""
+_TOUCHES = 1e-3  # m into the object that a run-off may be: meshes are faceted
+_LIFT, _WALL = 0.1, 0.5  # of the radius, where walls are looked for; cosine to one's normal
 
 
 def plan_on_mesh(
@@ -22,33 +49,98 @@ def plan_on_mesh(
 ) -> tuple[Segment, ...]:
     """Segments that work a region, in driving order; every contact is on the object's triangles.
 
+    Only run-off, offset, drag and edge contact, where the strategy has them, lead off them.
     planner: the one of `nrdf.toolpath.planners.PLANNERS` that the strategy names, unless given.
-    Raises ProcessError where it finds no line.
+    Raises ProcessError for a margin or clearance that leaves nothing of the region, a stepover
+    wider than it, a direction that stands on it, or more than `nrdf.toolpath.size_limits` allows.
     """
+    region = accessible_region(region, strategy.clearance_m, strategy.tool_radius_m)
+    check_size(region, strategy)
+    strategy = with_direction(region, strategy)
     make = PLANNERS[strategy.trajectory] if planner is None else planner
-    paths = within_limits(make(region, strategy), region, strategy)
-    normals = [path.normals for path in paths]
-    lines = tool_segments([path.contacts for path in paths], normals, strategy)
-    return add_approach_retract(lines, normals, strategy)
+    paths = modified(make(region, strategy), region, strategy)
+    waypoints = sum(len(path.contacts) for path in paths)
+    check_passes(waypoints, len(paths), strategy.passes)
+    passes = [
+        paths if index % 2 == 0 else [path.reversed() for path in reversed(paths)]
+        for index in range(strategy.passes)
+    ]
+    lines, normals = steady_tool_segments([path for once in passes for path in once], strategy)
+    lines = edge_contact(lines, strategy.edge_contact_m, strategy.lead_rad, strategy.tilt_rad)
+    return add_approach_retract(lines, normals, replace(strategy, passes=1))
 
 
-def within_limits(
+def modified(
     paths: Sequence[SurfacePath], region: RegionMesh, strategy: Strategy
 ) -> list[SurfacePath]:
-    """Paths without a step or turn above its limit, joined on the mesh, in a short order."""
+    """A planner's paths, put through the modifiers as the strategy says, one after another."""
+    project, step = _projection(region, strategy), _LARGEST_STEP * strategy.spacing_m
+    turn, spacing, radius = strategy.largest_turn_rad_m, strategy.spacing_m, strategy.tool_radius_m
+    paths = smooth_orientation(split(paths, step), turn)
+    points, faces = sample_evenly(region.mesh, radius / _PER_RADIUS)
+    outward = region.mesh.face_normals[faces]
+    paths = minimum_length(
+        paths, strategy.least_line_m, points, outward, radius, needed=_NEEDED, lost=_LOST
+    )
+    paths = chord_error(paths, project, strategy.chord_error_m)
+    paths = in_order(paths, region, strategy)
+    free = _free(region.parent, radius)
+    paths = run_off(paths, strategy.run_off_m, spacing, strategy.run_off_height_m, free)
+    if strategy.joined_gap_m > 0.0:
+        # Lines that run off the part are joined off it.
+        way = project if strategy.run_off_m == 0.0 else _straight
+        joined = join(paths, way, spacing, strategy.joined_gap_m)
+        steady = smooth_orientation(split(joined, step), turn)
+        paths = order_shortest(steady, strategy.line_order == "one-way")
+    dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
+    return offset(dragged, strategy.offset_m)
+
+
+def in_order(
+    paths: Sequence[SurfacePath], region: RegionMesh, strategy: Strategy
+) -> list[SurfacePath]:
+    """Paths in the strategy's order, from its start on, with short ways between them."""
+    one = strategy.line_order == "one-way"
+    along, left = line_axes(region, strategy)
+    paths = one_way(paths, along) if one else list(paths)
+    if strategy.start == "inside":
+        # Planners make rings and spirals from the outside in.
+        paths = [path.reversed() for path in reversed(paths)]
+    elif strategy.start not in (None, "outside"):
+        towards = along if strategy.start.startswith("far") else -along
+        towards = towards + (left if strategy.start.endswith("left") else -left)
+        paths = start_at(paths, towards, may_turn=not one)
+    return order_shortest(paths, one)
+
+
+def _projection(region: RegionMesh, strategy: Strategy) -> Project:
+    """To the region's nearest places of the same side, with normals as of the whole object."""
 
     def project(
         points: np.ndarray, normals: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         found = region.mesh.nearest(points, normals)
-        smooth = region.parent.smooth_normals(
-            found.points, region.parent.nearest(found.points, found.normals).faces,
-            strategy.tool_radius_m,
-        )  # fmt: skip
+        faces = region.parent.nearest(found.points, found.normals).faces
+        smooth = region.parent.smooth_normals(found.points, faces, strategy.tool_radius_m)
         return found.points, smooth, found.distances < strategy.tool_radius_m
 
-    step = _LARGEST_STEP * strategy.spacing_m
-    steady = smooth_orientation(split(paths, step))
-    gap = _LARGEST_GAP * strategy.stepover_m
-    joined = join(order_nearest(steady), project, strategy.spacing_m, gap)
-    return order_nearest(smooth_orientation(split(joined, step)))
+    return project
+
+
+def _straight(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return points, normals, np.ones(len(points), bool)
+
+
+def _free(target: TargetMesh, radius_m: float) -> Free:
+    """Beyond a line's end the tool may go where it is not in the object, with no wall ahead within
+    its radius."""
+
+    def free(points: np.ndarray, travel: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        found = target.nearest(points)
+        height = np.einsum("na,na->n", points - found.points, found.normals)
+        lifted = points + _LIFT * radius_m * normals
+        distance, face = target.first_hits(lifted, travel)
+        against = np.einsum("na,na->n", target.face_normals[face], travel) < -_WALL
+        return (height > -_TOUCHES) & ~((distance < radius_m) & against)
+
+    return free

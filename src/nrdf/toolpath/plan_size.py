@@ -11,10 +11,9 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.units import readable
 from nrdf.surface.border import OWN
 from nrdf.surface.patch import Patch
+from nrdf.toolpath.size_limits import MOST_LINES, MOST_WAYPOINTS, in_words
 from nrdf.toolpath.strategy import Strategy
 
-MOST_WAYPOINTS, MOST_LINES = 200_000, 10_000
-"""Of a process, all its passes together."""
 _MOST_PLACES = 1_000_000  # at which lines are laid out, and the tool's footprint is looked at
 _MOST_PAIRS = 1e7  # of a place and what its footprint reaches, or of places beside each other
 _PARTS = (
@@ -76,35 +75,24 @@ def check_size(patches: Sequence[Patch], strategy: Strategy) -> None:
     region = f"on the region's {size.area:.3g} m²"
     if size.waypoints > MOST_WAYPOINTS or size.lines > MOST_LINES:
         raise ProcessError(
-            f"about {_round(size.waypoints)} waypoints on {_round(size.lines)} lines would be "
+            f"about {in_words(size.waypoints)} waypoints on {in_words(size.lines)} lines would be "
             f"planned {region}, with {stepover}, spacing_m {strategy.spacing_m:g} "
             f"({readable('_m', strategy.spacing_m)}) and passes {strategy.passes}; at most "
-            f"{_round(MOST_WAYPOINTS)} on {_round(MOST_LINES)} are. Give more stepover_m or "
+            f"{in_words(MOST_WAYPOINTS)} on {in_words(MOST_LINES)} are. Give more stepover_m or "
             "spacing_m, fewer passes, or cut the region into several"
         )
     if size.nodes > _MOST_PLACES:
         raise ProcessError(
             f"{stepover} is too fine for a {strategy.trajectory} {region}: it would have to be "
-            f"laid out at about {_round(size.nodes)} places, at most {_round(_MOST_PLACES)} are. "
-            "Give more, or cut the region into several"
+            f"laid out at about {in_words(size.nodes)} places, at most {in_words(_MOST_PLACES)} "
+            "are. Give more, or cut the region into several"
         )
     if size.samples > _MOST_PLACES or size.pairs > _MOST_PAIRS:
         radius = f"{strategy.tool_radius_m:g} ({readable('_m', strategy.tool_radius_m)})"
         raise ProcessError(
             f"tool.radius_m {radius} does not go with {stepover} {region}: lines of about "
-            f"{_round(size.length)} m would have to be looked at {_round(size.samples)} times to "
-            "tell what the footprint reaches. Give radius and stepover of one size"
-        )
-
-
-def check_passes(waypoints: int, lines: int, passes: int) -> None:
-    """Raise ProcessError for given lines that are driven so often that they are too many."""
-    if passes * waypoints > MOST_WAYPOINTS or passes * lines > MOST_LINES:
-        raise ProcessError(
-            f"{passes} passes over {_round(waypoints)} waypoints on {_round(lines)} lines are "
-            f"{_round(passes * waypoints)} on {_round(passes * lines)}; at most "
-            f"{_round(MOST_WAYPOINTS)} on {_round(MOST_LINES)} are driven. Give fewer passes, or "
-            "fewer waypoints"
+            f"{in_words(size.length)} m would have to be looked at {in_words(size.samples)} times "
+            "to tell what the footprint reaches. Give radius and stepover of one size"
         )
 
 
@@ -116,8 +104,3 @@ def _breadth(patch: Patch, strategy: Strategy) -> float:
     if strategy.trajectory == "cross-hatch":
         return length + width
     return width if strategy.direction is None else length
-
-
-def _round(value: float) -> str:
-    """A number as people read it, rounded to two digits."""
-    return f"{float(f'{value:.2g}'):,.0f}" if value < 1e15 else f"{value:.0e}"

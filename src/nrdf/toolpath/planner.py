@@ -6,21 +6,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.frames import without_sign_jumps
 from nrdf.surface.accessibility import accessible_points
 from nrdf.surface.patch import Patch, inside_margin, patches_of
 from nrdf.surface.surface import Surface
 from nrdf.toolpath.contour import contour, spiral
-from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
 from nrdf.toolpath.gap_filling import fill_missed_points, fill_wide_gaps
 from nrdf.toolpath.modifiers.minimum_length import minimum_length
 from nrdf.toolpath.modifiers.order import order_nearest
 from nrdf.toolpath.modifiers.smooth_orientation import smooth_orientation
 from nrdf.toolpath.modifiers.split import split
-from nrdf.toolpath.plan_size import check_passes, check_size
+from nrdf.toolpath.plan_size import check_size
 from nrdf.toolpath.raster import raster
 from nrdf.toolpath.sampled_path import line_spacing, sample_lines
 from nrdf.toolpath.strategy import Strategy
@@ -30,6 +27,7 @@ from nrdf.toolpath.surface_path import (
     order_nearest_first,
     place_on_surface,
 )
+from nrdf.toolpath.tool_segments import add_approach_retract, tool_segments
 from nrdf.toolpath.types import Segment
 
 LEAST_IN_SURFACE = 0.2
@@ -103,56 +101,6 @@ def _steady(
     pieces = np.array([len(part) > 1 for part in parts for _ in part], dtype=bool)
     whole, radius = [line for part in parts for line in part], strategy.tool_radius_m
     return minimum_length(whole, radius, points, normals, radius, droppable=pieces)
-
-
-def add_approach_retract(
-    lines: Sequence[Segment],
-    normals: Sequence[np.ndarray],
-    strategy: Strategy,
-) -> tuple[Segment, ...]:
-    """Process segments in the given order, each with its approach and retract, for all passes.
-
-    lines: process segments; feed, force and dwell are the strategy's. normals: (n, 3), outward, of
-    the surface under the waypoints of each. Every second pass goes backwards, the tool turned half
-    around the normal. Raises ProcessError for too many of them.
-    """
-    check_passes(sum(len(line.positions) for line in lines), len(lines), strategy.passes)
-    segments: list[Segment] = []
-    number = 0
-    for index in range(strategy.passes):
-        order = range(len(lines)) if index % 2 == 0 else range(len(lines) - 1, -1, -1)
-        for k in order:
-            positions, quaternions = lines[k].positions, lines[k].quaternions_xyzw
-            outward = normals[k]
-            if index % 2:
-                positions, outward = positions[::-1], outward[::-1]
-                half = Rotation.from_rotvec(np.pi * outward)
-                quaternions = without_sign_jumps(
-                    (half * Rotation.from_quat(quaternions[::-1])).as_quat()
-                )
-            segments += _segments(positions, quaternions, outward, number, strategy)
-            number += 1
-    return tuple(segments)
-
-
-def tool_segments(
-    contacts: Sequence[np.ndarray], normals: Sequence[np.ndarray], strategy: Strategy
-) -> list[Segment]:
-    """Process segments of a tool along lines on the surface."""
-    travel = np.concatenate(
-        [travel_directions(line, 0.5 * strategy.stepover_m) for line in contacts]
-    )
-    upright = surface_frames(travel, np.concatenate(normals))
-    turned = Rotation.from_matrix(upright) * tilt_rotation(strategy.lead_rad, strategy.tilt_rad)
-    places = np.concatenate(contacts) - strategy.standoff_m * turned.as_matrix()[:, :, 2]
-    cuts = np.cumsum([len(line) for line in contacts])[:-1]
-    quaternions = [without_sign_jumps(part) for part in np.split(turned.as_quat(), cuts)]
-    return [
-        Segment("process", number, positions, held, strategy.feed_m_s, strategy.force_n)
-        for number, (positions, held) in enumerate(
-            zip(np.split(places, cuts), quaternions, strict=True)
-        )
-    ]
 
 
 def _check_stepover(patches: Sequence[Patch], strategy: Strategy) -> None:
@@ -232,37 +180,3 @@ def _angles(patches: Sequence[Patch], direction: np.ndarray | None) -> list[floa
         angle if share >= LEAST_IN_SURFACE else other
         for (angle, share), other in zip(seen, longest, strict=True)
     ]
-
-
-def _segments(
-    positions: np.ndarray,
-    quaternions: np.ndarray,
-    normals: np.ndarray,
-    number: int,
-    strategy: Strategy,
-) -> list[Segment]:
-    """Approach, process and retract of one line."""
-    work = Segment(
-        "process", number, positions, quaternions,
-        strategy.feed_m_s, strategy.force_n, strategy.dwell_s,
-    )  # fmt: skip
-    segments = [work]
-    ends = surface_frames(
-        Rotation.from_quat(quaternions[[0, -1]]).as_matrix()[:, :, 0], normals[[0, -1]]
-    )
-    if strategy.approach_distance_m > 0.0:
-        away = _direction_away(ends[0], -strategy.approach_angle_rad)
-        start = positions[0] + strategy.approach_distance_m * away
-        way, held = np.stack([start, positions[0]]), quaternions[[0, 0]]
-        segments.insert(0, Segment("approach", number, way, held, strategy.approach_feed_m_s))
-    if strategy.retract_distance_m > 0.0:
-        away = _direction_away(ends[1], strategy.retract_angle_rad)
-        stop = positions[-1] + strategy.retract_distance_m * away
-        way, held = np.stack([positions[-1], stop]), quaternions[[-1, -1]]
-        segments.append(Segment("retract", number, way, held, strategy.retract_feed_m_s))
-    return segments
-
-
-def _direction_away(frame: np.ndarray, angle: float) -> np.ndarray:
-    """The direction at `angle` (rad) from the normal towards x of an upright frame (3, 3)."""
-    return np.sin(angle) * frame[:, 0] - np.cos(angle) * frame[:, 2]

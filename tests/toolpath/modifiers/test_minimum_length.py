@@ -37,3 +37,12 @@ def test_of_two_that_reach_the_same_one_stays():
     assert len(kept(pair, needed=1.0)) == 1
     assert kept(pair, droppable=np.array([False, False])) == pair
     assert kept(pair, droppable=np.array([True, False])) == pair[1:]
+
+
+def test_short_paths_together_lose_no_more_than_allowed():
+    long = rows([0.015])
+    short = [straight((x, 0.05, 0), (x + 0.01, 0.05, 0)) for x in (0.02, 0.08, 0.14)]
+    assert kept([*long, *short], needed=0.5) == long
+    some = kept([*long, *short], needed=0.5, lost=0.2)
+    assert long[0] in some and 2 <= len(some) < 4
+    assert kept([*long, *short], needed=0.5, lost=0.0) == [*long, *short]

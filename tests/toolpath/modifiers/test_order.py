@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builders.surface_paths import rows
-from nrdf.toolpath.modifiers.order import order_nearest, way_between
+from builders.surface_paths import rows, straight
+from nrdf.toolpath.modifiers.order import order_nearest, order_shortest, way_between
 
 PLACES = np.arange(6) * 0.02
 
@@ -34,3 +34,26 @@ def test_a_shorter_order_than_the_nearest_next_is_kept():
     assert way_between(made) <= way_between(given)
     assert order_nearest(given[:2]) == given[:2]
     assert order_nearest([]) == []
+
+
+def test_turning_runs_around_shortens_what_the_nearest_next_leaves_for_last():
+    rng = np.random.default_rng(3)
+    starts = np.pad(rng.uniform(0, 1, (40, 2)), ((0, 0), (0, 1)))
+    given = [straight(p, p + np.array([0.05, 0.0, 0.0])) for p in starts]
+    nearest, shortest = order_nearest(given), order_shortest(given)
+    assert way_between(shortest) < 0.9 * way_between(nearest)
+    assert shortest[0] is given[0]
+    middles = {tuple(np.round(path.contacts.mean(axis=0), 9)) for path in shortest}
+    assert middles == {tuple(np.round(path.contacts.mean(axis=0), 9)) for path in given}
+    # No run that could still be turned around would make it shorter.
+    for i in range(1, len(given)):
+        for j in range(i + 1, len(given) + 1):
+            turned = [path.reversed() for path in shortest[i:j][::-1]]
+            other = [*shortest[:i], *turned, *shortest[j:]]
+            assert way_between(other) > way_between(shortest) - 1e-5
+
+
+def test_lines_of_one_way_are_never_turned():
+    given = rows(PLACES[[0, 3, 1, 5, 2, 4]])
+    assert {id(path) for path in order_shortest(given, one_way=True)} == {id(p) for p in given}
+    assert order_shortest(given[:1]) == given[:1]

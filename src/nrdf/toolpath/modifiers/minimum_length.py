@@ -20,13 +20,15 @@ def minimum_length(
     normals: np.ndarray,
     radius_m: float,
     needed: float = 0.0,
+    lost: float = np.inf,
     droppable: np.ndarray | None = None,
 ) -> list[SurfacePath]:
     """Paths less those shorter than `least_m` that nothing is lost with.
 
     points, normals: (n, 3), spread over the region, which tell what the footprint of `radius_m`
-    reaches. A short path stays if it alone reaches more than the share `needed` of them. The
-    shortest are looked at first. droppable: which of the paths (k,) may go; all, unless given.
+    reaches. A short path stays if it alone reaches more than the share `needed` of them, or if more
+    than the share `lost` would go with all that go. The shortest are looked at first. droppable:
+    which of the paths (k,) may go; all, unless given.
     """
     lengths = np.array([total_length(path.contacts) for path in paths])
     may_go = lengths < least_m if droppable is None else (lengths < least_m) & droppable
@@ -36,9 +38,11 @@ def minimum_length(
     reached = [_reached(path, points, normals, radius_m) for path in paths]
     count = np.bincount(np.concatenate(reached), minlength=len(points))
     dropped: set[int] = set()
+    left = lost * len(points)
     for k in short:
         alone = int((count[reached[k]] == 1).sum())
-        if alone <= needed * len(points) and len(dropped) < len(paths) - 1:
+        if alone <= min(needed * len(points), left) and len(dropped) < len(paths) - 1:
+            left -= alone
             count[reached[k]] -= 1
             dropped.add(k)
     return [path for k, path in enumerate(paths) if k not in dropped]

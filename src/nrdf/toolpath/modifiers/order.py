@@ -8,6 +8,9 @@ import numpy as np
 
 from nrdf.toolpath.surface_path import SurfacePath
 
+_MOST_TURNED, _ROUNDS = 500, 2  # paths of which runs are turned, and how often, for each of them
+_LEAST_GAIN_M = 1e-6
+
 
 def order_nearest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[SurfacePath]:
     """The same paths in a shorter order: from each one's end to the nearest end of another.
@@ -31,6 +34,45 @@ def order_nearest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[S
         ordered.append(paths[which].reversed() if backwards else paths[which])
         place = ends[which, 0 if backwards else 1]
     return ordered if way_between(ordered) < way_between(paths) else list(paths)
+
+
+def order_shortest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[SurfacePath]:
+    """The same paths in the shortest order that is found: nearest next, then runs of them turned
+    around wherever that makes the ways between shorter.
+
+    As `order_nearest` says of the first path and of `one_way`; runs are not turned then.
+    """
+    ordered = order_nearest(paths, one_way)
+    if one_way or not 2 < len(ordered) <= _MOST_TURNED:
+        return ordered
+    starts = np.array([path.contacts[0] for path in ordered])
+    stops = np.array([path.contacts[-1] for path in ordered])
+    number, backwards = np.arange(len(ordered)), np.zeros(len(ordered), bool)
+    for _ in range(_ROUNDS * len(ordered)):
+        i, j, gain = _best_turn(starts, stops)
+        if gain < _LEAST_GAIN_M:
+            break
+        run = slice(i, j + 1)
+        starts[run], stops[run] = stops[run][::-1].copy(), starts[run][::-1].copy()
+        number[run], backwards[run] = number[run][::-1].copy(), ~backwards[run][::-1]
+    return [
+        ordered[k].reversed() if turned else ordered[k]
+        for k, turned in zip(number, backwards, strict=True)
+    ]
+
+
+def _best_turn(starts: np.ndarray, stops: np.ndarray) -> tuple[int, int, float]:
+    """The run of paths, from i to j, that saves most if driven from its end, and how much, m."""
+    count = len(starts)
+    before = np.linalg.norm(stops[:-1, None] - stops[None, 1:], axis=2)  # (i - 1, j)
+    after = np.linalg.norm(starts[1:, None] - starts[None, 1:], axis=2)  # (i, j + 1)
+    now = np.linalg.norm(starts[1:] - stops[:-1], axis=1)
+    # Row i - 1 and column j - 1: the run from i to j; the last one is followed by nothing.
+    gain = now[:, None] - before
+    gain[:, :-1] += now[None, 1:] - after[:, 1:]
+    gain[np.tril_indices(count - 1, -1)] = -np.inf
+    i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return int(i) + 1, int(j) + 1, float(gain[i, j])
 
 
 def way_between(paths: Sequence[SurfacePath]) -> float:

@@ -37,7 +37,7 @@ def smooth_orientation(
         if (found <= allowed).all():
             smooth.append(path)
             continue
-        normals = _relaxed(path.normals, allowed)
+        normals = turned_steadily(path.normals, allowed)
         off = angles_between(path.normals, normals)
         settled = (turns(normals) <= allowed).all()
         if settled and off.max() <= largest_tilt_rad:
@@ -48,7 +48,7 @@ def smooth_orientation(
     return smooth
 
 
-def _relaxed(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def turned_steadily(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """Normals (n, 3) turned until neighbours differ by at most `allowed` (n - 1,), rad, if the
     rounds suffice for that.
 
