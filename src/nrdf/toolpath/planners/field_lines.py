@@ -26,7 +26,8 @@ _LEAST_SPACING = 0.9
 _SINGLE = 1.5  # radii: a part so wide is reached from its middle line
 _PIECE, _NEXT_TO = 8.0, 0.6
 """Stepovers that a short piece is long, at most, and that it is from longer lines."""
-_SPIKE = 0.001  # of the area: how far out the outermost tips of a part do not count
+SPIKE = 0.001
+"""Share of a part's area: how far out its outermost tips do not count."""
 _TAIL = 0.02  # of the area: what may lie beyond the reach of a single line
 
 
@@ -96,7 +97,7 @@ def even_levels(
     stepover_m: float,
     single_m: float = 0.0,
     more: int = 0,
-    tail: float = _SPIKE,
+    tail: float = SPIKE,
 ) -> np.ndarray:
     """Levels (k,) of a distance (n,) for lines one stepover apart, or up to a tenth less.
 
@@ -163,7 +164,7 @@ def _needed(lines: list[MeshLine], strategy: Strategy) -> list[MeshLine]:
 
 
 def lines_at(
-    part: Part, values: np.ndarray, strategy: Strategy, more: int = 0, tail: float = _SPIKE
+    part: Part, values: np.ndarray, strategy: Strategy, more: int = 0, tail: float = SPIKE
 ) -> list[MeshLine]:
     """Lines of a distance (v,) across a part, one stepover apart, inside the margin.
 

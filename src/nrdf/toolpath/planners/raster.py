@@ -12,12 +12,13 @@ from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.rod import rod_strokes
 from nrdf.toolpath.planners.sheet_lines import line_direction, sheet_lines
-from nrdf.toolpath.planners.sheets import is_band, is_round_rod, sheets_of
+from nrdf.toolpath.planners.sheets import is_band, is_round_rod, pieces_of, sheets_of, width
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
 _LARGE, _LEFT = 3.0, 0.2
 """Footprints: smaller sheets are asked for what is left of them, which must be that large."""
+_FRAME, _ARM = 4.0, 0.3  # stepovers that a frame's bars are wide; footprints that are left
 _LEFT_SHORT = 0.02  # of the region: what must be left of a sheet that is shorter than the radius
 
 
@@ -52,11 +53,25 @@ def plan_cross_hatch(region: RegionMesh, strategy: Strategy) -> list[SurfacePath
 def _sheet_paths(
     region: RegionMesh, sheet: Part, strategy: Strategy, beside: Sequence[SurfacePath]
 ) -> list[SurfacePath]:
+    """Paths on one sheet: what its lines leave, as the arms of a frame, is worked after it."""
     if not is_band(sheet, strategy) and is_round_rod(sheet):
         strokes = rod_strokes(region, sheet, strategy)
         if strokes:
             return strokes
-    return driven(region, sheet, sheet_lines(region, sheet, strategy, beside), strategy)
+    paths = driven(region, sheet, sheet_lines(region, sheet, strategy, beside), strategy)
+    if not paths or width(sheet.mesh) > _FRAME * strategy.stepover_m:
+        return paths
+    radius = strategy.tool_radius_m
+    left = ~reached_from_paths(sheet, [*beside, *paths], radius)
+    if strategy.edge_margin_m > 0.0 and sheet.border_distance is not None:
+        left &= sheet.border_distance[sheet.mesh.faces].mean(axis=1) > strategy.edge_margin_m
+    least = _ARM * np.pi * radius**2
+    if left.all() or float(sheet.mesh.areas[left].sum()) < least:
+        return paths
+    for piece in pieces_of(sheet, left):
+        if float(piece.mesh.areas.sum()) >= least:
+            paths += _sheet_paths(region, piece, strategy, [*beside, *paths])
+    return paths
 
 
 def _sheets(region: RegionMesh, strategy: Strategy) -> list[Part]:

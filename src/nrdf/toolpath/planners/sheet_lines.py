@@ -19,7 +19,7 @@ from nrdf.toolpath.planners.distance import (
     factor,
     signed_distance,
 )
-from nrdf.toolpath.planners.field_lines import Part, lines_at
+from nrdf.toolpath.planners.field_lines import SPIKE, Part, lines_at
 from nrdf.toolpath.planners.level_lines import MeshLine
 from nrdf.toolpath.planners.reach import reached_from_lines, reached_from_paths
 from nrdf.toolpath.planners.sheets import Ends, band_borders, ends_of, is_band, width
@@ -87,19 +87,14 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
         first, last = band_borders(mesh, strategy)
         around = _across_band(part, first, last, strategy.stepover_m)
         return around, lines_at(part, around, strategy)
-    along = line_direction(part, strategy.direction)
-    extent = float(np.ptp(mesh.vertices @ along))
-    chosen, best = np.zeros(len(mesh.vertices)), list[MeshLine]()
-    most = -1.0
-    narrow = 0.0 < width(mesh) < _NARROW * strategy.stepover_m
-    if part.outward is not None and (narrow or strategy.direction is None):
-        ends = ends_of(mesh)
-        if ends.length_m**2 > _STRIP * float(mesh.areas.sum()):
-            chosen = _across_strip(part, ends)
-            best = lines_at(part, chosen, strategy, tail=_TAIL)
-            most = usual_length(best) * even_share(mesh, chosen)
-            if narrow and most >= _WHOLE * ends.length_m:
-                return chosen, best
+    chosen, best, most = np.zeros(len(mesh.vertices)), list[MeshLine](), -1.0
+    ends = ends_of(mesh) if part.outward is not None else None
+    if ends is not None and ends.length_m**2 <= _STRIP * float(mesh.areas.sum()):
+        ends = None
+    narrow = ends is not None and width(mesh) < _NARROW * strategy.stepover_m
+    direction = None if narrow else strategy.direction
+    along = line_direction(part, direction)
+    extent = float(np.ptp(mesh.vertices @ along)) if ends is None else ends.length_m
     for across in across_directions(part, along):
         height = height_over_middle(part, across)
         # Around a closed part the plane's lines are followed, around bends as well.
@@ -108,12 +103,17 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
         )
         for way in ways:
             distance = way(mesh, height)
-            lines = lines_at(part, distance, strategy)
+            lines = lines_at(part, distance, strategy, tail=_TAIL if narrow else SPIKE)
             value = usual_length(lines) * even_share(mesh, distance)
-            if value > (_BETTER if part.outward is None else 1.0) * most:
+            if value > _BETTER * most:
                 chosen, best, most = distance, lines, value
             if value >= _WHOLE * extent:
                 return chosen, best
+    if ends is not None and direction is None:
+        followed = _across_strip(part, ends)
+        lines = lines_at(part, followed, strategy, tail=_TAIL)
+        if usual_length(lines) * even_share(mesh, followed) > _BETTER * most:
+            chosen, best = followed, lines
     return chosen, best
 
 

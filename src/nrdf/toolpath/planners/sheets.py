@@ -68,6 +68,16 @@ def sheets_of(region: RegionMesh, part: Part, strategy: Strategy) -> list[Part]:
     return [part.sheet(number == k) for k in order if areas[k] > 0.0]
 
 
+def pieces_of(part: Part, chosen: np.ndarray) -> list[Part]:
+    """The pieces that hang together of a part's chosen (f,) triangles, the largest first."""
+    one, other, _ = _joints(part.mesh)
+    within = chosen[one] & chosen[other]
+    number = np.where(chosen, _linked(len(chosen), one[within], other[within]), -1)
+    kept = np.unique(number[chosen])
+    pieces = [part.sheet(number == k) for k in kept]
+    return sorted(pieces, key=lambda piece: -float(piece.mesh.areas.sum()))
+
+
 def felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndarray:
     """The smooth normal (f, 3) that a tool feels on each triangle, nearly: one for all triangles
     of a cell that is a fraction of the tool and look to one side."""
