@@ -91,7 +91,8 @@ def modified(
         way = project if strategy.run_off_m == 0.0 else _straight
         joined = join(paths, way, spacing, strategy.joined_gap_m)
         steady = smooth_orientation(split(joined, step), turn)
-        paths = order_shortest(steady, strategy.line_order == "one-way")
+        lift = max(strategy.retract_distance_m, radius)
+        paths = order_shortest(steady, strategy.line_order == "one-way", lift)
     dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
     return offset(dragged, strategy.offset_m)
 
@@ -110,7 +111,7 @@ def in_order(
         towards = along if strategy.start.startswith("far") else -along
         towards = towards + (left if strategy.start.endswith("left") else -left)
         paths = start_at(paths, towards, may_turn=not one)
-    return order_shortest(paths, one)
+    return order_shortest(paths, one, max(strategy.retract_distance_m, strategy.tool_radius_m))
 
 
 def _projection(region: RegionMesh, strategy: Strategy) -> Project:

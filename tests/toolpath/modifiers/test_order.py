@@ -7,6 +7,7 @@ import pytest
 
 from builders.surface_paths import rows, straight
 from nrdf.toolpath.modifiers.order import order_nearest, order_shortest, way_between
+from nrdf.toolpath.surface_path import SurfacePath
 
 PLACES = np.arange(6) * 0.02
 
@@ -57,3 +58,16 @@ def test_lines_of_one_way_are_never_turned():
     given = rows(PLACES[[0, 3, 1, 5, 2, 4]])
     assert {id(path) for path in order_shortest(given, one_way=True)} == {id(p) for p in given}
     assert order_shortest(given[:1]) == given[:1]
+
+
+def test_the_two_sides_of_a_thin_sheet_are_driven_one_after_the_other():
+    def side(height, up):
+        return [
+            SurfacePath(
+                np.array([[0.0, y, height], [0.5, y, height]]), np.tile([0.0, 0.0, up], (2, 1))
+            )
+            for y in (0.0, 0.02, 0.04)
+        ]
+
+    found = order_shortest([*side(0.005, 1.0), *side(0.0, -1.0)], lift_m=0.05)
+    assert [float(path.normals[0, 2]) for path in found] == [1.0] * 3 + [-1.0] * 3

@@ -12,15 +12,18 @@ _MOST_TURNED, _ROUNDS = 500, 2  # paths of which runs are turned, and how often,
 _LEAST_GAIN_M = 1e-6
 
 
-def order_nearest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[SurfacePath]:
+def order_nearest(
+    paths: Sequence[SurfacePath], one_way: bool = False, lift_m: float = 0.0
+) -> list[SurfacePath]:
     """The same paths in a shorter order: from each one's end to the nearest end of another.
 
     Paths may be driven backwards, unless `one_way`. The first one stays first. An order that is
-    not shorter than the one that was given is not taken.
+    not shorter than the one that was given is not taken. lift_m: ways are measured that far above
+    the surface, so that the two sides of a thin sheet are as far apart as they are for a tool.
     """
     if len(paths) < 3:
         return list(paths)
-    ends = np.array([[path.contacts[0], path.contacts[-1]] for path in paths])
+    ends = _ends(paths, lift_m)
     waiting = np.ones(len(paths), bool)
     ordered, place, which, backwards = [paths[0]], ends[0, 1], 0, False
     for _ in range(len(paths) - 1):
@@ -33,20 +36,22 @@ def order_nearest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[S
         which, backwards = int(left[k]), bool(end)
         ordered.append(paths[which].reversed() if backwards else paths[which])
         place = ends[which, 0 if backwards else 1]
-    return ordered if way_between(ordered) < way_between(paths) else list(paths)
+    return ordered if way_between(ordered, lift_m) < way_between(paths, lift_m) else list(paths)
 
 
-def order_shortest(paths: Sequence[SurfacePath], one_way: bool = False) -> list[SurfacePath]:
+def order_shortest(
+    paths: Sequence[SurfacePath], one_way: bool = False, lift_m: float = 0.0
+) -> list[SurfacePath]:
     """The same paths in the shortest order that is found: nearest next, then runs of them turned
     around wherever that makes the ways between shorter.
 
-    As `order_nearest` says of the first path and of `one_way`; runs are not turned then.
+    As `order_nearest` says of the first path, of `one_way`, with which no runs are turned, and of
+    `lift_m`.
     """
-    ordered = order_nearest(paths, one_way)
+    ordered = order_nearest(paths, one_way, lift_m)
     if one_way or not 2 < len(ordered) <= _MOST_TURNED:
         return ordered
-    starts = np.array([path.contacts[0] for path in ordered])
-    stops = np.array([path.contacts[-1] for path in ordered])
+    starts, stops = _ends(ordered, lift_m).transpose(1, 0, 2).copy()
     number, backwards = np.arange(len(ordered)), np.zeros(len(ordered), bool)
     for _ in range(_ROUNDS * len(ordered)):
         i, j, gain = _best_turn(starts, stops)
@@ -75,8 +80,13 @@ def _best_turn(starts: np.ndarray, stops: np.ndarray) -> tuple[int, int, float]:
     return int(i) + 1, int(j) + 1, float(gain[i, j])
 
 
-def way_between(paths: Sequence[SurfacePath]) -> float:
-    """The straight ways from each path's end to the next one's start, m."""
-    starts = np.array([path.contacts[0] for path in paths[1:]]).reshape(-1, 3)
-    stops = np.array([path.contacts[-1] for path in paths[:-1]]).reshape(-1, 3)
-    return float(np.linalg.norm(starts - stops, axis=1).sum())
+def way_between(paths: Sequence[SurfacePath], lift_m: float = 0.0) -> float:
+    """The straight ways from each path's end to the next one's start, `lift_m` above them, m."""
+    ends = _ends(paths, lift_m)
+    return float(np.linalg.norm(ends[1:, 0] - ends[:-1, 1], axis=1).sum())
+
+
+def _ends(paths: Sequence[SurfacePath], lift_m: float) -> np.ndarray:
+    """Where each path starts and stops (p, 2, 3), lifted along the normals."""
+    at = [path.contacts[[0, -1]] + lift_m * path.normals[[0, -1]] for path in paths]
+    return np.array(at).reshape(-1, 2, 3)
