@@ -60,16 +60,29 @@ class WindingNumber:
         )
 
 
-def mesh_winding_numbers(vertices: np.ndarray, faces: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Generalised winding numbers (m,) at places (m, 3), of the mesh of outward `faces` (f, 3).
+class MeshWindingNumber:
+    """The generalised winding number of the mesh of outward `faces` (f, 3), made ready once.
 
     1 inside a closed surface, 0 outside (Jacobson et al., 2013; fast form of Barill et al., 2018).
-    vertices (v, 3) and places have one unit. Raises DataError for no mesh, and CloudError for
-    places that are not finite.
+    Raises DataError for no mesh.
     """
-    vertices, faces = check_mesh(vertices, faces)
-    cube = _Cube.around(vertices)
-    return np.asarray(igl.fast_winding_number(cube(vertices), faces, cube(_finite(places))))
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        vertices, faces = check_mesh(vertices, faces)
+        self._cube = _Cube.around(vertices)
+        self._tree = igl.FastWindingNumberBVH()
+        self._tree.init(self._cube(vertices), faces)
+
+    def __call__(self, places: np.ndarray) -> np.ndarray:
+        """Winding numbers (m,) at places (m, 3), in the vertices' unit. Raises CloudError for
+        places that are not finite."""
+        places = self._cube(_finite(places))
+        return np.asarray(self._tree.winding_number(places)) if len(places) else np.zeros(0)
+
+
+def mesh_winding_numbers(vertices: np.ndarray, faces: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """`MeshWindingNumber` at places (m, 3) asked for once."""
+    return MeshWindingNumber(vertices, faces)(places)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,17 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError
+from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.mesh import check_mesh, clean_mesh, outer_skin
-from nrdf.geometry.winding import mesh_winding_numbers
+from nrdf.geometry.winding import MeshWindingNumber
+from nrdf.surface.mesh_sewing import paired_half_edges, split_vertices
+from nrdf.surface.mesh_union import united
 
 _VIEWED = 20_000  # points of the skin that say which way its parts look
 _OFF = 1e-4  # longest sides above a face from where it is asked whether that is inside
 _INSIDE = 0.6  # winding number from which a place is inside; half-way is on the surface
+_NOTHING = 1e-6  # longest sides squared, an area that is not worth a word
+_CROSSINGS = 12  # of a ray with the surface
 _PLACES = np.array(
     [[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2], [5.6, 0.2, 0.2], [0.2, 5.6, 0.2], [0.2, 0.2, 5.6]]
 )
@@ -53,33 +58,74 @@ def repaired_skin(
     turned = int((faces != before).any(axis=1).sum())
     if turned:
         repairs.append(_said(turned, "", "turned outwards"))
+    made = united(vertices, faces)
+    if made.covered > _NOTHING * float(np.ptp(vertices, axis=0).max()) ** 2:
+        repairs.append(
+            f"{made.parts} parts united, of which others covered {1e4 * made.covered:.3g} cm²"
+        )
+    vertices, faces = made.vertices, made.faces
     hidden = hidden_faces(vertices, faces)
     if hidden.all():
         raise DataError("no face of the mesh can be reached from outside")
     if hidden.any():
         repairs.append(_said(int(hidden.sum()), "inside the object", "removed"))
     faces = faces[~hidden]
-    split, new = igl.split_nonmanifold(np.ascontiguousarray(faces))[:2]
-    new = np.asarray(new).reshape(-1)
-    if len(new) > len(np.unique(faces)):
-        more = len(new) - len(np.unique(faces))
-        repairs.append(f"{more} vertices doubled where more than two faces met")
-    used, faces = np.unique(np.asarray(split), return_inverse=True)
-    return vertices[new[used]], faces.reshape(-1, 3), tuple(repairs)
+    used = len(np.unique(faces))
+    split, place = split_vertices(faces, paired_half_edges(vertices, faces))
+    if len(place) > used:
+        repairs.append(f"{len(place) - used} vertices doubled where more than two faces met")
+    return vertices[place], split, tuple(repairs)
 
 
 def hidden_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Which outward faces (f,) lie inside the object as a whole, as those of overlapping parts."""
+    """Which outward faces (f,) lie inside the object as a whole, as those of overlapping parts.
+
+    Rays from seven places of such a face leave more parts than they enter, and the winding number
+    above its middle is that of the inside.
+    """
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     above = _OFF * float(np.ptp(vertices, axis=0).max()) * normals
+    tree = igl.AABB()
+    tree.init(vertices, faces)
     hidden = np.ones(len(faces), bool)
     for weights in _PLACES / _PLACES.sum(axis=1, keepdims=True):
         asked = np.flatnonzero(hidden)
         places = np.einsum("c,fca->fa", weights, corners[asked]) + above[asked]
-        hidden[asked] = mesh_winding_numbers(vertices, faces, places) > _INSIDE
+        hidden[asked] = _leaving(tree, vertices, faces, normals, places, normals[asked])
+    if hidden.any():
+        # The slow and sure way, for what open parts do to rays.
+        places = corners[hidden].mean(axis=1) + above[hidden]
+        hidden[hidden] = MeshWindingNumber(vertices, faces)(places) > _INSIDE
     return hidden
+
+
+def _leaving(
+    tree: igl.AABB,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    normals: np.ndarray,
+    places: np.ndarray,
+    directions: np.ndarray,
+) -> np.ndarray:
+    """Whether rays (m,) from places (m, 3) leave more surfaces than they enter."""
+    total = np.zeros(len(places), np.int64)
+    going = np.arange(len(places))
+    origins = places.copy()
+    step = 1e-9 * float(np.ptp(vertices, axis=0).max())
+    for _ in range(_CROSSINGS):
+        ways = np.ascontiguousarray(directions[going])
+        face, away, _ = tree.intersect_ray_first(
+            vertices, faces, np.ascontiguousarray(origins[going]), ways
+        )
+        hit = np.asarray(face) >= 0
+        going, ways = going[hit], ways[hit]
+        if not len(going):
+            break
+        facing = np.einsum("ma,ma->m", normals[np.asarray(face)[hit]], ways)
+        total[going] += np.sign(facing).astype(np.int64)
+        origins[going] += (np.asarray(away)[hit] + step)[:, None] * ways
+    return np.asarray(total > 0)
 
 
 def _loose(faces: np.ndarray) -> int:

@@ -1,38 +1,39 @@
-"""Where a region ends on a mesh: votes of points become a smooth function, and its level set."""
+"""Where regions end on a mesh: votes of points become smooth functions, and their level sets."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import igl
 import numpy as np
-from scipy.sparse import csc_matrix, diags_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csr_matrix, diags_array
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.winding import mesh_winding_numbers
-from nrdf.surface.mesh_cut import FineMesh, bisected, cut, refine
-from nrdf.surface.mesh_edges import edge_components
+from nrdf.surface.fine_mesh import FineMesh, refine
+from nrdf.surface.mesh_cut import cut
+from nrdf.surface.mesh_edges import opposite_half_edges
+from nrdf.surface.mesh_sewing import split_vertices
 from nrdf.surface.target_mesh import TargetMesh
 
 LEVEL = 0.5
 """Membership at a region's border."""
-_VOTES, _SIDE = 6, 4.0  # votes that count at a place; spacings that opposite normals are apart
-_FAR = 4.0  # spacings from where a vote says nothing
 _SMOOTHING = 1.5  # spacings of votes that heat spreads over, at least
 _OF_RADIUS = 0.35  # of the tool that heat spreads over, at least
-_EDGE = 1.5  # edges of the fine mesh along that way
-_MOST_FACES = 120_000
-_MOST_PARTS = 200  # each of which is asked for what it covers
-_OFF, _INSIDE, _HALVINGS = 1e-4, 0.6, 5  # as of `mesh_repair`, and steps to the place of a change
+_EDGE, _OF_TOOL = 1.5, 0.45  # edges of the fine mesh along that way, and tool's radii of an edge
+_MOST_FACES = 100_000
+_CREASE, _ACROSS = 0.6, 0.05  # cosine between its faces; conductance across it for each vertex
+_FAR = 1.5  # spacings from the surface, from where a vote says nothing
+_STEEPEST = 30.0  # cotangent: thinner triangles conduct no better
+_ROUNDS, _ACCURACY = 200, 2e-3  # of conjugate gradients
 
 
 @dataclass(frozen=True)
 class Votes:
-    """Points (n, 3), m, with outward normals (n, 3), and how much (n,) each belongs to a region, 0
-    to 1. spacing: typical distance between the points, m."""
+    """Points (n, 3), m, with outward normals (n, 3), and how much each belongs to each region,
+    membership (n, r), 0 to 1. spacing: typical distance between the points, m."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -40,139 +41,186 @@ class Votes:
     spacing: float
 
     @staticmethod
-    def checked(points: np.ndarray, normals: np.ndarray, membership: np.ndarray) -> Votes:
+    def checked(
+        points: np.ndarray, normals: np.ndarray, memberships: Mapping[str, np.ndarray]
+    ) -> Votes:
         """Raises ProcessError for arrays that do not fit each other, and shares that are none."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         normals = np.asarray(normals, dtype=np.float64)
-        membership = np.asarray(membership, dtype=np.float64)
         if points.ndim != 2 or points.shape[1:] != (3,) or normals.shape != points.shape:
             raise ProcessError(f"points {points.shape} and normals {normals.shape} must be (n, 3)")
-        if membership.shape != points.shape[:1] or len(points) < 8:
-            raise ProcessError(
-                f"a region needs the membership (n,) of at least 8 points, not "
-                f"{membership.shape} of {len(points)}"
-            )
+        shares = []
+        for name, given in memberships.items():
+            share = np.asarray(given, dtype=np.float64)
+            if share.shape != points.shape[:1] or len(points) < 8:
+                raise ProcessError(
+                    f"{name}: a region needs the membership (n,) of at least 8 points, not "
+                    f"{share.shape} of {len(points)}"
+                )
+            if not ((share >= 0.0) & (share <= 1.0)).all():
+                raise ProcessError(f"{name}: a membership is 0 to 1")
+            shares.append(share)
         if not (np.isfinite(points).all() and np.isfinite(normals).all()):
             raise ProcessError("the points of a region must be finite")
-        if not ((membership >= 0.0) & (membership <= 1.0)).all():
-            raise ProcessError("a membership is 0 to 1")
-        if not (membership > LEVEL).any():
-            raise ProcessError("no point belongs to the region by more than a half")
         away = cKDTree(points).query(points, [8])[0][:, 0]
         spacing = float(np.median(away) * np.sqrt(np.pi / 7.0))
+        membership = np.stack(shares, axis=1) if shares else np.zeros((len(points), 0))
         return Votes(points, unit_vectors(normals), membership, max(spacing, 1e-9))
 
-    def at(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Membership (m,) at places (m, 3) of a side, normals (m, 3), and how well it is known
-        (m,), 0 to 1: not at all where no vote of that side is around."""
-        apart = _SIDE * self.spacing / 2.0
-        tree = cKDTree(np.hstack([self.points, apart * self.normals]))
-        count = min(_VOTES, len(self.points))
-        away, near = tree.query(np.hstack([places, apart * normals]), count)
-        near = near.reshape(len(places), -1)
-        weight = np.exp(-((away.reshape(near.shape) / self.spacing) ** 2))
-        weight = np.maximum(weight, 1e-30)
-        known = np.clip(_FAR - away.reshape(near.shape)[:, 0] / self.spacing, 1e-4, 1.0)
-        return (weight * self.membership[near]).sum(axis=1) / weight.sum(axis=1), known
+
+@dataclass(frozen=True)
+class CutObject:
+    """A whole object in fine triangles, cut along the borders of its regions.
+
+    inside: (r, f) bool, the faces of each region. given_away: (r,) area, m², that votes gave to
+    a region and that another one has.
+    """
+
+    mesh: FineMesh
+    inside: np.ndarray
+    given_away: np.ndarray
 
 
-def cut_at_border(
-    target: TargetMesh, votes: Votes, tool_radius_m: float, whole: bool = False
-) -> tuple[FineMesh, np.ndarray]:
-    """The target's faces around a region, fine and cut where it ends, and which (f,) it has.
+def cut_at_borders(
+    target: TargetMesh, votes: Votes, tool_radius_m: float, allow_overlap: bool = False
+) -> CutObject:
+    """The target in fine triangles, cut where its regions end.
 
-    whole: all other faces of the target, too. Faces covered by other parts of the object are left
-    out. The votes are spread by heat over the mesh, for a time that takes it some spacings of the
-    points and a part of the tool's radius far.
+    The votes are spread by heat over the mesh, for a time that takes it some spacings of the points
+    and a part of the tool's radius far. Unless regions may overlap, each place belongs to the
+    region with the largest membership there.
     """
     reach = max(_SMOOTHING * votes.spacing, _OF_RADIUS * tool_radius_m)
-    fine = _fine_around(target, votes, reach, whole)
-    fine = _uncovered(target, fine)
-    share = smooth_membership(target, fine, votes, reach)
-
-    def crossing(ends: np.ndarray) -> np.ndarray:
-        inner, outer = share[ends[:, 0]], share[ends[:, 1]]
-        return np.asarray((inner - LEVEL) / np.maximum(inner - outer, 1e-12))
-
-    return cut(fine, share > LEVEL, crossing)
-
-
-def _fine_around(target: TargetMesh, votes: Votes, reach: float, whole: bool) -> FineMesh:
-    belonging = cKDTree(votes.points[votes.membership > 0.2 * LEVEL])
-    given = FineMesh(target.vertices, target.faces, np.arange(len(target.faces)))
-    margin = 2.0 * reach + 3.0 * votes.spacing
-
-    def wanted(middles: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        reach = radii + margin
-        away = belonging.query(middles, distance_upper_bound=reach.max(initial=0.0))[0]
-        return np.asarray(away < reach)
-
-    area = belonging.n / len(votes.points) * float(target.face_areas.sum())
-    edge = max(reach / _EDGE, float(np.sqrt(8.0 * area / _MOST_FACES)))
-    fine = refine(given, edge, wanted, _MOST_FACES + 2 * len(target.faces))
-    return fine if whole else fine.of_faces(wanted(fine.middles, fine.radii))
+    edge = min(reach / _EDGE, _OF_TOOL * tool_radius_m)
+    fine = refine(target.vertices, target.faces, edge, most_faces=_MOST_FACES)
+    values = smooth_memberships(fine, votes, reach)
+    count = values.shape[2]
+    for number in range(count):
+        fine, values = cut(fine, _level(values, number, allow_overlap), values)
+    # Each face is on one side of every border now, up to rounding.
+    middle = values.mean(axis=1)
+    inside = np.array([_level(middle, number, allow_overlap) > 0.0 for number in range(count)])
+    areas = fine.areas
+    given_away = np.array([areas[(middle[:, k] > LEVEL) & ~inside[k]].sum() for k in range(count)])
+    return CutObject(fine, inside, given_away)
 
 
-def _uncovered(target: TargetMesh, fine: FineMesh) -> FineMesh:
-    """Without what lies inside other parts of the object, cut where it dives into them."""
-    above = _OFF * target.size
-    normals = igl.per_vertex_normals(fine.vertices, fine.faces)
-    normals = unit_vectors(np.nan_to_num(np.asarray(normals)))
-
-    def covered(places: np.ndarray) -> np.ndarray:
-        return mesh_winding_numbers(target.vertices, target.faces, places) > _INSIDE
-
-    lifted = fine.vertices + above * normals
-    hidden = _amid_other_parts(target, fine)
-    hidden[hidden] = covered(lifted[hidden])
-    if not hidden.any():
-        return fine
-
-    def crossing(ends: np.ndarray) -> np.ndarray:
-        starts, stops = (fine.vertices[ends[:, k]] for k in (0, 1))
-        lift = above * unit_vectors(normals[ends[:, 0]] + normals[ends[:, 1]])
-        return bisected(starts + lift, stops + lift, covered, _HALVINGS)
-
-    pieces, inside = cut(fine, hidden, crossing)
-    if inside.all():
-        return fine
-    return pieces.of_faces(~inside)
+def _level(values: np.ndarray, number: int, allow_overlap: bool) -> np.ndarray:
+    """A function of memberships (..., r) that is positive inside a region."""
+    own = values[..., number]
+    if allow_overlap or values.shape[-1] == 1:
+        return np.asarray(own - LEVEL)
+    other = np.delete(values, number, axis=-1).max(axis=-1)
+    return np.asarray(np.minimum(own - LEVEL, own - other))
 
 
-def _amid_other_parts(target: TargetMesh, fine: FineMesh) -> np.ndarray:
-    """Which vertices (v,) are within the bounding box of a part that they do not belong to."""
-    part = edge_components(target.faces)
-    count = int(part.max()) + 1
-    corners = target.vertices[target.faces]
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, part, corners.min(axis=1))
-    np.maximum.at(high, part, corners.max(axis=1))
-    own = np.zeros(len(fine.vertices), np.int64)
-    own[fine.faces] = part[fine.origin][:, None]
-    amid = np.zeros(len(fine.vertices), bool)
-    for number in range(count if count <= _MOST_PARTS else 0):
-        others = np.flatnonzero(~amid & (own != number))
-        places = fine.vertices[others]
-        amid[others] = ((places >= low[number]) & (places <= high[number])).all(axis=1)
-    return amid if count <= _MOST_PARTS else ~amid
+def smooth_memberships(fine: FineMesh, votes: Votes, reach: float) -> np.ndarray:
+    """Memberships (f, 3, r) at the corners of a fine mesh: the votes, spread by heat over it.
 
-
-def smooth_membership(target: TargetMesh, fine: FineMesh, votes: Votes, reach: float) -> np.ndarray:
-    """Membership (v,) at the vertices of a fine mesh: the votes, spread by heat over its faces.
-
-    One implicit step of the heat equation, for the time that takes heat `reach` far (m), on the
-    cotangent Laplacian of the intrinsic Delaunay triangulation. Where votes are missing, those
-    around flow in.
+    One implicit step of the heat equation, for the time that takes heat `reach` far (m), from the
+    places of the votes on the mesh. Where there are none, those around flow in. Hardly any heat
+    crosses a crease, so the corners of the faces on its two sides may differ: regions end there
+    rather than beside it.
     """
-    seen, known = votes.at(fine.middles, target.face_normals[fine.origin])
+    opposite = opposite_half_edges(fine.faces)
+    creases = _creases(fine, opposite)
+    flat = opposite.copy()
+    flat[creases] = -1
+    corners, place = split_vertices(fine.faces, flat)
+    count = len(place)
+    smooth = FineMesh(fine.vertices[place], corners, fine.origin, fine.edge_m)
+    name = corners.ravel()
+    links = (name[creases], name[opposite[creases] // 3 * 3 + (opposite[creases] + 1) % 3])
+    bridge = csr_matrix((np.full(len(creases), _ACROSS), links), (count, count))
+    bridge = bridge + bridge.T
+    bridge = csr_matrix(diags_array(np.asarray(bridge.sum(axis=1)).ravel()) - bridge)
+    corner, share, told = _places(smooth, votes)
+    row = np.arange(len(corner))[:, None].repeat(3, axis=1)
+    at = csr_matrix((share.ravel(), (row.ravel(), corner.ravel())), (len(corner), count))
+    weight = votes.spacing**2
+    system = csr_matrix(weight * (at.T @ at) + reach**2 * (_conductance(smooth) + bridge))
+    heat = weight * (at.T @ votes.membership[told])
+    start = np.zeros((count, votes.membership.shape[1]))
+    known = np.asarray(at.sum(axis=0)).ravel()
+    start[known > 0] = heat[known > 0] / (weight * known[known > 0, None])
+    found = np.clip(_solved(system, heat, start), 0.0, 1.0)
+    return np.asarray(found[corners])
+
+
+def _creases(fine: FineMesh, opposite: np.ndarray) -> np.ndarray:
+    """Half-edges (k,) between faces that meet at an angle."""
+    half = np.flatnonzero(opposite >= 0)
+    facing = np.einsum("ea,ea->e", fine.normals[half // 3], fine.normals[opposite[half] // 3])
+    return half[facing < _CREASE]
+
+
+def _places(fine: FineMesh, votes: Votes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners (k, 3) of the faces that votes lie on, their shares (k, 3) of the place, and which
+    votes (k,) those are: all that lie near a face of their side."""
+    vertices, faces = fine.vertices, np.ascontiguousarray(fine.faces)
+    tree = igl.AABB()
+    tree.init(vertices, faces)
+    corner, share, told = [], [], []
+    asked = np.arange(len(votes.points))
+    # From above the surface, where its own side is nearer than that behind it.
+    for lift in (0.0, 0.5, 2.0):
+        places = votes.points[asked] + lift * votes.spacing * votes.normals[asked]
+        squared, face, near = tree.squared_distance(vertices, faces, places)
+        face = np.asarray(face)
+        facing = np.einsum("na,na->n", fine.normals[face], votes.normals[asked])
+        near_enough = np.asarray(squared) < ((_FAR + lift) * votes.spacing) ** 2
+        good = (facing > 0.5) & near_enough
+        a, b, c = (vertices[faces[face[good], k]] for k in range(3))
+        corner.append(faces[face[good]])
+        share.append(igl.barycentric_coordinates(np.asarray(near)[good], a, b, c))
+        told.append(asked[good])
+        asked = asked[~good]
+        if not len(asked):
+            break
+    shares = np.clip(np.nan_to_num(np.concatenate(share), nan=1.0 / 3.0), 0.0, 1.0)
+    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-12)
+    return np.concatenate(corner), shares, np.concatenate(told)
+
+
+def _conductance(fine: FineMesh) -> csr_matrix:
+    """Cotangent matrix (v, v), positive semi-definite; no edge conducts negatively or much better
+    than others, however thin its triangles are."""
+    corners = fine.vertices[fine.faces]
+    one = np.roll(corners, -1, axis=1) - corners
+    two = np.roll(corners, -2, axis=1) - corners
+    double = np.linalg.norm(np.cross(one[:, 0], two[:, 0]), axis=1)
+    cotangent = np.einsum("fka,fka->fk", one, two) / np.maximum(double, 1e-300)[:, None]
+    half = 0.5 * np.clip(cotangent, -_STEEPEST, _STEEPEST)
+    # The angle at a corner is that of the edge across.
+    tail = np.roll(fine.faces, -1, axis=1).ravel()
+    head = np.roll(fine.faces, -2, axis=1).ravel()
     count = len(fine.vertices)
-    part = fine.areas / 3.0
-    corner = fine.faces.reshape(-1)
-    mass = np.bincount(corner, np.repeat(part * known, 3), count)
-    heat = np.bincount(corner, np.repeat(part * known * seen, 3), count)
-    laplacian = igl.cotmatrix(fine.vertices, fine.faces)
-    system = csc_matrix(diags_array(mass + 1e-9 * part.mean()) - reach**2 * laplacian)
-    # Symmetric and positive, so that nothing need be swapped.
-    options = {"SymmetricMode": True}
-    found = splu(system, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve(heat)
-    return np.clip(found, 0.0, 1.0)
+    joined = csr_matrix(
+        (np.tile(half.ravel(), 2), (np.concatenate([tail, head]), np.concatenate([head, tail]))),
+        (count, count),
+    )
+    joined.sum_duplicates()
+    joined.data = np.clip(joined.data, 1e-3, _STEEPEST)
+    return csr_matrix(diags_array(np.asarray(joined.sum(axis=1)).ravel()) - joined)
+
+
+def _solved(system: csr_matrix, right: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Solution (v, r) of a positive definite system by conjugate gradients, all sides at once."""
+    scale = 1.0 / np.maximum(system.diagonal(), 1e-300)[:, None]
+    found = start
+    rest = right - system @ found
+    way = scale * rest
+    size = np.einsum("vr,vr->r", rest, way)
+    goal = _ACCURACY**2 * np.maximum(np.einsum("vr,vr->r", right, scale * right), 1e-300)
+    for _ in range(_ROUNDS):
+        if (size <= goal).all():
+            break
+        pushed = system @ way
+        step = size / np.maximum(np.einsum("vr,vr->r", way, pushed), 1e-300)
+        found = found + step * way
+        rest = rest - step * pushed
+        turned = scale * rest
+        new = np.einsum("vr,vr->r", rest, turned)
+        way = turned + new / np.maximum(size, 1e-300) * way
+        size = new
+    return np.asarray(found)

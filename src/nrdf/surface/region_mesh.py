@@ -7,19 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.frames import unit_vectors
-from nrdf.surface.mesh_cut import FineMesh
-from nrdf.surface.mesh_edges import boundary_loops, edge_components, opposite_half_edges
-from nrdf.surface.region_border import LEVEL, Votes, cut_at_border
+from nrdf.surface.mesh_edges import boundary_loops, edge_components
+from nrdf.surface.region_border import LEVEL, Votes, cut_at_borders
+from nrdf.surface.region_pieces import Pieces
 from nrdf.surface.target_mesh import TargetMesh
 
-_ALIKE = 0.5  # least cosine between a hole and the region around it
-_TOUCH, _APART = 1e-5, 1e-5  # longest sides within which parts touch, if they look the same way
+_WORTH = 0.1  # footprints, an area that is worth a word
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,25 +92,51 @@ def region_meshes(
     points: (n, 3), m, of the whole target, with outward normals (n, 3). memberships: name to (n,),
     0 to 1. tool_radius_m: name to the radius of the tool that works the region. Specks smaller
     than the tool's footprint are removed and holes smaller than it filled; of the regions in
-    `fill_holes` all holes are. Raises ProcessError for arrays that do not fit each other.
+    `fill_holes` all holes are. Unless they may overlap, each place belongs to the region with the
+    largest membership there. Raises ProcessError for arrays that do not fit each other.
     """
-    found: dict[str, RegionMesh] = {}
-    left_out: dict[str, str] = {}
-    for name, membership in memberships.items():
-        if not (np.asarray(membership) > LEVEL).any():
-            left_out[name] = "No point belongs to the region by more than a half."
+    for name in memberships:
+        radius = tool_radius_m.get(name, np.nan)
+        if not (np.isfinite(radius) and radius > 0.0):
+            raise ProcessError(f"{name}: the tool's radius must be above 0 m, not {radius:g}")
+    votes = Votes.checked(points, normals, memberships)
+    left_out = {
+        name: "No point belongs to the region by more than a half."
+        for number, name in enumerate(memberships)
+        if not (votes.membership[:, number] > LEVEL).any()
+    }
+    if len(left_out) == len(memberships):
+        return RegionMeshes({}, left_out)
+    there = [name for name in memberships if name not in left_out]
+    cut = cut_at_borders(target, votes, min(tool_radius_m[name] for name in there), allow_overlap)
+    pieces = Pieces(cut.mesh)
+    footprint = {name: np.pi * tool_radius_m[name] ** 2 for name in there}
+    changes: dict[str, list[str]] = {name: [] for name in there}
+    inside: dict[str, np.ndarray] = {}
+    for faces, given_away, name in zip(cut.inside, cut.given_away, memberships, strict=True):
+        if name not in there:
             continue
-        try:
-            found[name] = region_mesh(
-                target, points, normals, membership, tool_radius_m[name], name in fill_holes
+        if given_away > _WORTH * footprint[name]:
+            changes[name] += _said([given_away], "overlap", "given to another region")
+        inside[name], removed = pieces.without_specks(faces, footprint[name])
+        changes[name] += _said(removed, "speck", "smaller than the tool removed")
+        if not inside[name].any():
+            left_out[name] = (
+                "Nothing is left of the region: all its parts are smaller than the tool's "
+                f"footprint of {1e4 * footprint[name]:.3g} cm²; take a smaller tool."
             )
-        except NothingLeft as error:
-            left_out[name] = f"{str(error)[0].upper()}{str(error)[1:]}."
+    taken = np.sum([*inside.values()], axis=0)
+    found: dict[str, RegionMesh] = {}
+    for name in (name for name in there if name not in left_out):
+        others = (taken > inside[name]) & (not allow_overlap)
+        largest = np.inf if name in fill_holes else footprint[name]
+        whole, filled, kept = pieces.without_holes(inside[name], others, largest)
+        changes[name] += _said(filled, "hole", "filled")
+        changes[name] += _said(kept, "hole", "larger than the tool kept")
+        piece = cut.mesh.part(whole)
+        mesh = TargetMesh(piece.vertices, piece.faces)
+        found[name] = RegionMesh(mesh, target, tuple(changes[name]))
     return RegionMeshes(found, left_out)
-
-
-class NothingLeft(ProcessError):
-    """All parts of a region are smaller than its tool."""
 
 
 def region_mesh(
@@ -126,106 +147,19 @@ def region_mesh(
     tool_radius_m: float,
     fill_holes: bool = False,
 ) -> RegionMesh:
-    """The region that votes stand for, with a smooth border, as a tool can work it.
-
-    points: (n, 3), m, of the whole target, with outward normals (n, 3) and membership (n,), 0 to 1.
-    Specks smaller than the tool's footprint are removed and holes smaller than it filled; with
-    fill_holes all holes are. Faces that other parts of the object cover are left out. Raises
-    ProcessError where nothing is left, or for arrays that do not fit each other.
-    """
-    if not (np.isfinite(tool_radius_m) and tool_radius_m > 0.0):
-        raise ProcessError(f"the tool's radius must be above 0 m, not {tool_radius_m:g}")
-    votes = Votes.checked(points, normals, membership)
-    fine, inside = cut_at_border(target, votes, tool_radius_m, fill_holes)
-    footprint = np.pi * tool_radius_m**2
-    changes: list[str] = []
-    inside, filled = _without_holes(target, fine, inside, np.inf if fill_holes else footprint)
-    changes += _said(filled, "hole", "filled")
-    inside, removed = _without_specks(target, fine, inside, footprint)
-    changes += _said(removed, "speck", "smaller than the tool removed")
-    if not inside.any():
-        raise NothingLeft(
-            "nothing is left of the region: all its parts are smaller than the tool's footprint of "
-            f"{1e4 * footprint:.3g} cm²; take a smaller tool"
-        )
-    piece = fine.of_faces(inside)
-    return RegionMesh(TargetMesh(piece.vertices, piece.faces), target, tuple(changes))
-
-
-def _without_holes(
-    target: TargetMesh, fine: FineMesh, inside: np.ndarray, largest: float
-) -> tuple[np.ndarray, list[float]]:
-    """The region's faces (f,) with holes up to an area (m²) filled, and the areas of those.
-
-    A hole is a part of the rest that only one part of the region surrounds, is smaller than that,
-    and looks the same way.
-    """
-    number = edge_components(fine.faces, inside)
-    areas = fine.areas
-    area = np.bincount(number, areas)
-    weighted = areas[:, None] * target.face_normals[fine.origin]
-    facing = np.stack([np.bincount(number, weighted[:, a]) for a in range(3)], axis=1)
-    of_region = np.zeros(len(area), bool)
-    of_region[number[inside]] = True
-    opposite = opposite_half_edges(fine.faces)
-    half = np.flatnonzero(opposite >= 0)
-    here, there = number[half // 3], number[opposite[half] // 3]
-    meet = ~of_region[here] & of_region[there]
-    pairs = np.unique(np.stack([here[meet], there[meet]], axis=1), axis=0)
-    # Which way the region looks along the border with each part of the rest.
-    along = np.zeros((len(area), 3))
-    np.add.at(along, here[meet], target.face_normals[fine.origin[opposite[half[meet]] // 3]])
-    open_sided = np.zeros(len(area), bool)
-    open_sided[number[np.flatnonzero(opposite < 0) // 3]] = True
-    around = np.bincount(pairs[:, 0], minlength=len(area))
-    alike = np.einsum(
-        "pa,pa->p",
-        unit_vectors(facing),
-        along / np.maximum(np.bincount(here[meet], minlength=len(area)), 1)[:, None],
+    """One region, as `region_meshes` finds it. Raises ProcessError where nothing is left of it."""
+    name = "region"
+    meshes = region_meshes(
+        target,
+        points,
+        normals,
+        {name: membership},
+        {name: tool_radius_m},
+        {name} if fill_holes else (),
     )
-    filled = []
-    for hole, region in pairs:
-        closed = around[hole] == 1 and not open_sided[hole] and alike[hole] > _ALIKE
-        if closed and area[hole] <= min(largest, area[region]):
-            filled.append(int(hole))
-    return inside | np.isin(number, filled), [float(area[hole]) for hole in filled]
-
-
-def _without_specks(
-    target: TargetMesh, fine: FineMesh, inside: np.ndarray, footprint: float
-) -> tuple[np.ndarray, list[float]]:
-    """The region's faces (f,) without parts smaller than a footprint (m²), and their areas.
-
-    Parts that touch, facing the same way, count as one: not all meshes are sewn together.
-    """
-    chosen = np.flatnonzero(inside)
-    number = edge_components(fine.faces[chosen])
-    areas = fine.areas[chosen]
-    group = _touching(target, fine, chosen, number)
-    area = np.bincount(group, areas)
-    small = area < footprint
-    kept = inside.copy()
-    kept[chosen[small[group]]] = False
-    return kept, [float(a) for a in area[small]]
-
-
-def _touching(
-    target: TargetMesh, fine: FineMesh, chosen: np.ndarray, number: np.ndarray
-) -> np.ndarray:
-    """Group (f,) of each chosen face: its part, with the parts of its side that it touches."""
-    count = int(number.max(initial=-1)) + 1
-    corner = fine.faces[chosen].reshape(-1)
-    place = np.hstack(
-        [
-            fine.vertices[corner],
-            _APART * target.size * np.repeat(target.face_normals[fine.origin[chosen]], 3, axis=0),
-        ]
-    )
-    tree = cKDTree(place)
-    pairs = tree.query_pairs(_TOUCH * target.size, output_type="ndarray")
-    one, two = (np.repeat(number, 3)[pairs[:, k]] for k in (0, 1))
-    links = coo_matrix((np.ones(len(one), bool), (one, two)), (count, count))
-    return np.asarray(connected_components(links, directed=False)[1])[number]
+    if name in meshes.left_out:
+        raise ProcessError(meshes.left_out[name])
+    return meshes.found[name]
 
 
 def _said(areas: list[float], noun: str, done: str) -> list[str]:

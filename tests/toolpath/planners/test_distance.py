@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from builders.regions_of_shapes import cap, plate, plate_with_hole, tube
+from nrdf.surface.fine_mesh import refine
 from nrdf.toolpath.planners.distance import (
     distance_across,
     distance_from,
     even_share,
     signed_distance,
 )
-from nrdf.toolpath.planners.fine_mesh import refine
 
 
 def fine(region, edge=0.008):

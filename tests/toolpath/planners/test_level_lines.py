@@ -3,7 +3,7 @@ import pytest
 
 from builders.regions_of_shapes import plate, tube
 from nrdf.geometry.polylines import step_lengths, total_length
-from nrdf.toolpath.planners.fine_mesh import refine
+from nrdf.surface.fine_mesh import refine
 from nrdf.toolpath.planners.level_lines import cut_where, level_lines, resampled
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import SuperLU, splu
 
-from nrdf.toolpath.planners.fine_mesh import FineMesh
+from nrdf.surface.fine_mesh import FineMesh
 from nrdf.toolpath.planners.level_lines import level_lines
 
 _ROUNDS = 8

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.polylines import total_length
+from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
-from nrdf.toolpath.planners.fine_mesh import FineMesh, refine
 from nrdf.toolpath.planners.level_lines import MeshLine, cut_where, level_lines, resampled
 from nrdf.toolpath.planners.ordering import snake_order
 from nrdf.toolpath.strategy import Strategy

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
-from nrdf.toolpath.planners.fine_mesh import FineMesh
+from nrdf.surface.fine_mesh import FineMesh
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from builders.regions_of_shapes import plate, plate_with_hole, tube
-from nrdf.toolpath.planners.fine_mesh import refine
+from nrdf.surface.fine_mesh import refine
 
 
 @pytest.mark.parametrize("region", [plate(), plate_with_hole(), tube()])

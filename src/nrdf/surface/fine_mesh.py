@@ -1,4 +1,4 @@
-"""A region's mesh refined for planning: the same surface, in triangles that are small."""
+"""A mesh refined for planning: the same surface, in triangles that are small."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 MOST_FACES = 50_000
 """Faces of a refined mesh, about; larger regions are planned in larger triangles."""
-_ROUNDS, _FLIPS = 24, 3
+_ROUNDS, _FLIPS, _FIRST_FLIPS = 24, 3, 12
+_OF_SQUARE = 0.15  # of a square on the longest edge, what a triangle has about
 _FLAT = 3e-7  # of the mesh's extent: two triangles that lie so flat are one face, cut anyhow
 
 
@@ -47,7 +48,7 @@ class FineMesh:
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
         """Edges (e, 2) of two vertices, and the edges (f, 3) of each face, from each corner on."""
-        return _edges(self.faces)
+        return edges_of(self.faces)
 
     @cached_property
     def border(self) -> np.ndarray:
@@ -125,41 +126,69 @@ class FineMesh:
         return np.cross(b - a, c - a)
 
 
-def refine(vertices: np.ndarray, faces: np.ndarray, edge_m: float) -> FineMesh:
-    """Split the edges of a mesh (v, 3), (f, 3) until none is much longer than `edge_m`.
+def refine(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    edge_m: float,
+    wanted: np.ndarray | None = None,
+    most_faces: int = MOST_FACES,
+) -> FineMesh:
+    """Split the edges of a mesh (v, 3), (f, 3) until none is longer than `edge_m`.
 
-    Where that would be too many triangles (`MOST_FACES`), the edge is as much longer as needed.
+    wanted: (f,) bool; with it, only faces that are, and the edges that others share with them.
+    Where that would be too many triangles (`most_faces`), the edge is as much longer as needed.
     Thin triangles are cut across only, and flat neighbours share the best of their two diagonals.
     """
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    edge_m = max(edge_m, float(np.sqrt(area / (0.4 * MOST_FACES))))
     origin = np.arange(len(faces))
-    for _ in range(_ROUNDS):
-        pairs, of_face = _edges(faces)
-        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
-        long = length > edge_m
-        if not long.any():
+    wanted = np.ones(len(faces), bool) if wanted is None else np.asarray(wanted)
+    a, b, c = (vertices[faces[wanted, k]] for k in range(3))
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    edge_m = max(edge_m, float(np.sqrt(area / (_OF_SQUARE * most_faces))))
+    flat = _FLAT * float(np.ptp(vertices, axis=0).max())
+    finished: list[tuple[np.ndarray, np.ndarray]] = []
+    for number in range(_ROUNDS):
+        # Only faces with a long edge change, and that edge is long for both of its faces.
+        pairs, of_face, long = _long_edges(vertices, faces, edge_m, wanted[origin])
+        busy = long[of_face].any(axis=1)
+        finished.append((faces[~busy], origin[~busy]))
+        faces, origin = faces[busy], origin[busy]
+        for _ in range(_FIRST_FLIPS if number == 0 else 1):
+            faces, changed = _flipped(vertices, faces, flat, wanted[origin])
+            if changed <= 0.01 * len(faces):
+                break
+        if not len(faces):
             break
-        inner = _Inner.of(vertices, faces, pairs, of_face)
-        thin = inner.flat & (inner.height < 0.5 * edge_m)
-        long[inner.edge[thin]] = False
+        pairs, of_face, long = _long_edges(vertices, faces, edge_m, wanted[origin])
+        inner = _Inner.of(vertices, faces, pairs, of_face, flat)
+        long[inner.edge[inner.flat & (inner.height < 0.5 * edge_m)]] = False
         if not long.any():
             break
         middle = np.full(len(pairs), -1)
         middle[long] = len(vertices) + np.arange(int(long.sum()))
-        added = 0.5 * (vertices[pairs[long, 0]] + vertices[pairs[long, 1]])
-        vertices = np.concatenate([vertices, added])
-        faces, source = _split(faces, middle[of_face], vertices)
+        vertices = np.concatenate([vertices, vertices[pairs[long]].mean(axis=1)])
+        faces, source = split_edges(faces, middle[of_face], vertices)
         origin = origin[source]
-        for _ in range(_FLIPS):
-            faces, changed = _flipped(vertices, faces)
-            if changed <= 0.01 * len(faces):
-                break
+    finished.append((faces, origin))
+    faces, origin = (np.concatenate(kind) for kind in zip(*finished, strict=True))
+    for _ in range(_FLIPS):
+        faces, changed = _flipped(vertices, faces, flat, wanted[origin])
+        if changed <= 0.01 * len(faces):
+            break
     return FineMesh(vertices, faces, origin, edge_m)
 
 
-def _split(
+def _long_edges(
+    vertices: np.ndarray, faces: np.ndarray, edge_m: float, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges (e, 2), those of each face (f, 3), and which are long and of a wanted face."""
+    pairs, of_face = edges_of(faces)
+    long = np.zeros(len(pairs), bool)
+    long[of_face[wanted]] = True
+    length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    return pairs, of_face, long & (length > edge_m)
+
+
+def split_edges(
     faces: np.ndarray, middle: np.ndarray, vertices: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Faces (f, 3) with new vertices (f, 3) on their edges, -1 where none; and their sources."""
@@ -210,7 +239,11 @@ class _Inner:
 
     @staticmethod
     def of(
-        vertices: np.ndarray, faces: np.ndarray, pairs: np.ndarray, of_face: np.ndarray
+        vertices: np.ndarray,
+        faces: np.ndarray,
+        pairs: np.ndarray,
+        of_face: np.ndarray,
+        limit: float,
     ) -> _Inner:
         sides = of_face.ravel()
         order = np.argsort(sides, kind="stable")
@@ -225,7 +258,6 @@ class _Inner:
         side = pb - pa
         normal, beside = np.cross(side, pc - pa), np.cross(pd - pa, side)
         size, other_size = np.linalg.norm(normal, axis=1), np.linalg.norm(beside, axis=1)
-        limit = _FLAT * float(np.ptp(vertices, axis=0).max())
         off = np.abs(np.einsum("ea,ea->e", normal, pd - pa)) / np.maximum(size, 1e-300)
         flat = (faces[g, other % 3] == b) & (off < limit) & (c != d)
         flat &= np.einsum("ea,ea->e", normal, beside) > 0.0
@@ -234,13 +266,16 @@ class _Inner:
         return _Inner(inner, np.stack([f, g], axis=1), corners, flat, height)
 
 
-def _flipped(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, int]:
-    """Faces (f, 3) with edges between flat neighbours turned where that makes them less thin, and
-    how many were: Delaunay's criterion, for edges that share no triangle."""
-    inner = _Inner.of(vertices, faces, *_edges(faces))
+def _flipped(
+    vertices: np.ndarray, faces: np.ndarray, flat: float, kind: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Faces (f, 3) with edges between flat neighbours of one kind (f,) turned where that makes them
+    less thin, and how many were: Delaunay's criterion, for edges that share no triangle."""
+    inner = _Inner.of(vertices, faces, *edges_of(faces), flat)
     pa, pb, pc, pd = vertices[inner.corners].transpose(1, 0, 2)
     wide = _angle(pa - pc, pb - pc) + _angle(pa - pd, pb - pd)
-    chosen = np.flatnonzero(inner.flat & (wide > np.pi + 1e-6))
+    alike = kind[inner.faces[:, 0]] == kind[inner.faces[:, 1]]
+    chosen = np.flatnonzero(inner.flat & alike & (wide > np.pi + 1e-6))
     if not len(chosen):
         return faces, 0
     # Each takes its two faces, the widest first.
@@ -263,7 +298,7 @@ def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.arctan2(crossed, np.einsum("ea,ea->e", one, other))
 
 
-def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     pairs = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     pairs = np.sort(pairs, axis=1).astype(np.int64)
     key = pairs[:, 0] * (int(faces.max(initial=0)) + 1) + pairs[:, 1]

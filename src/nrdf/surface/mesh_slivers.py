@@ -1,0 +1,82 @@
+"""Triangles that are nearly lines, as cuts leave them: taken out without moving the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from nrdf.surface.mesh_edges import opposite_half_edges
+
+_SHORT, _FLAT = 1e-6, 2e-6  # longest sides: edges, and heights of triangles, that go
+_ROUNDS = 12
+
+
+def without_slivers(
+    vertices: np.ndarray, faces: np.ndarray, origin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same surface to two millionths of its size without needles and flat triangles.
+
+    origin: (f,), where each face came from. Returns vertices, faces and origins.
+    """
+    size = float(np.ptp(vertices, axis=0).max())
+    for _ in range(_ROUNDS):
+        corners = vertices[faces]
+        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        double = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        short = sides < _SHORT * size
+        flat = double < _FLAT * size * sides.max(axis=1)
+        if short.any():
+            faces, origin = _merged(faces, origin, short, len(vertices))
+        elif flat.any():
+            before = len(faces)
+            faces, origin, changed = _flipped(faces, origin, flat, sides.argmax(axis=1))
+            if not changed and len(faces) == before:
+                break
+        else:
+            break
+    return vertices, faces, origin
+
+
+def _merged(
+    faces: np.ndarray, origin: np.ndarray, short: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """With the ends of short edges (f, 3) as one."""
+    one, two = faces[short], np.roll(faces, -1, axis=1)[short]
+    links = coo_matrix((np.ones(len(one), bool), (one, two)), (count, count))
+    label = connected_components(links, directed=False)[1]
+    first = np.zeros(int(label.max()) + 1, np.int64)
+    first[label] = np.arange(count)
+    faces = first[label][faces]
+    good = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return faces[good], origin[good]
+
+
+def _flipped(
+    faces: np.ndarray, origin: np.ndarray, flat: np.ndarray, longest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Flat faces (f,) turned about their longest sides, so that the face beyond is divided at the
+    flat one's third corner. Those at a border go."""
+    thin = np.flatnonzero(flat)
+    half = 3 * thin + longest[thin]
+    other = opposite_half_edges(faces)[half]
+    gone = thin[other < 0]
+    thin, half, other = (one[other >= 0] for one in (thin, half, other))
+    beyond = other // 3
+    good = ~flat[beyond]
+    _, first = np.unique(beyond[good], return_index=True)
+    chosen = np.flatnonzero(good)[first]
+    thin, half, other, beyond = (one[chosen] for one in (thin, half, other, beyond))
+    a, b, c = (faces[thin, (half + k) % 3] for k in range(3))
+    d = faces[beyond, (other + 2) % 3]
+    fine = c != d
+    thin, beyond, a, b, c, d = (one[fine] for one in (thin, beyond, a, b, c, d))
+    faces, origin = faces.copy(), origin.copy()
+    faces[beyond] = np.stack([b, c, d], axis=1)
+    faces[thin] = np.stack([c, a, d], axis=1)
+    origin[thin] = origin[beyond]
+    kept = np.ones(len(faces), bool)
+    kept[gone] = False
+    return faces[kept], origin[kept], len(thin)
