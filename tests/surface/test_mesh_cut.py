@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from nrdf.surface.fine_mesh import FineMesh, refine
-from nrdf.surface.mesh_cut import cut
+from nrdf.surface.mesh_cut import bisected, cut
 
 
 @pytest.fixture
@@ -44,3 +44,9 @@ def test_a_function_that_jumps_at_an_edge_is_cut_along_it_and_the_mesh_stays_sew
 def test_what_is_not_crossed_is_left_alone(box):
     level = np.ones((len(box.faces), 3))
     assert cut(box, level, np.zeros((len(box.faces), 3, 0)))[0] is box
+
+
+def test_a_change_between_two_places_is_found():
+    starts, ends = np.zeros((1, 3)), np.ones((1, 3))
+    share = bisected(starts, ends, lambda places: places[:, 0] < 0.3, 12)
+    assert share[0] == pytest.approx(0.3, abs=1e-3)

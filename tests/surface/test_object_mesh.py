@@ -21,7 +21,7 @@ def test_a_mesh_stays_the_mesh_that_it_is_without_its_inner_wall():
     both = trimesh.util.concatenate([BALL, trimesh.creation.icosphere(2, radius=0.3)])
     found = object_mesh(ball_cloud(Mesh(np.array(both.vertices), np.array(both.faces))), 0.03)
     assert len(found.faces) == len(BALL.faces)
-    assert any("inside the object" in repair for repair in found.repairs)
+    assert any("2 parts united" in repair for repair in found.repairs)
 
 
 def test_a_cloud_becomes_a_mesh():

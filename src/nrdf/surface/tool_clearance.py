@@ -10,7 +10,8 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.units import readable
 from nrdf.geometry.winding import mesh_winding_numbers
-from nrdf.surface.mesh_cut import FineMesh, bisected, cut, refine
+from nrdf.surface.fine_mesh import FineMesh, edges_of, refine
+from nrdf.surface.mesh_cut import bisected, divided
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 
@@ -52,12 +53,7 @@ def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: flo
     if clearance_m <= 0.0:
         return region
     own = region.mesh
-    fine = refine(
-        FineMesh(own.vertices, own.faces, np.arange(len(own.faces))),
-        tool_radius_m / _PARTS,
-        lambda middles, _: np.ones(len(middles), bool),
-        _MOST_FACES,
-    )
+    fine = refine(own.vertices, own.faces, tool_radius_m / _PARTS, most_faces=_MOST_FACES)
     normals = TargetMesh(fine.vertices, fine.faces).vertex_normals
 
     def free(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
@@ -73,13 +69,19 @@ def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: flo
             f"{readable('clearance_m', clearance_m)} free before the surface; give less, or 0"
         )
 
-    def crossing(ends: np.ndarray) -> np.ndarray:
-        one, other = (places[ends[:, k]] for k in (0, 1))
-        outward = unit_vectors(normals[ends[:, 0]] + normals[ends[:, 1]])
-        return bisected(one, other, lambda between: free(between, outward), _HALVINGS)
-
-    pieces, kept = cut(fine, inside, crossing)
-    left = pieces.of_faces(kept)
+    # Where clearance ends on edges between a vertex with it and one without.
+    pairs, of_face = edges_of(fine.faces)
+    change = np.flatnonzero(inside[pairs[:, 0]] != inside[pairs[:, 1]])
+    ends = np.where(inside[pairs[change, :1]], pairs[change], pairs[change, ::-1])
+    one, other = (places[ends[:, k]] for k in (0, 1))
+    outward = unit_vectors(normals[ends[:, 0]] + normals[ends[:, 1]])
+    way = bisected(one, other, lambda between: free(between, outward), _HALVINGS)
+    share = np.full(len(pairs), np.nan)
+    share[change] = np.where(inside[pairs[change, 0]], way, 1.0 - way)
+    pieces, _ = divided(fine, pairs, of_face, share, np.zeros((len(fine.faces), 3, 0)))
+    # Every piece has a vertex that was there before.
+    given = np.concatenate([inside, np.zeros(len(pieces.vertices) - len(inside), bool)])
+    left = pieces.part(given[pieces.faces].any(axis=1))
     return replace(region, mesh=TargetMesh(left.vertices, left.faces, own.repairs))
 
 
@@ -88,6 +90,6 @@ def _drawn_in(fine: FineMesh) -> np.ndarray:
     may lie in the plane of a wall, which a ray then meets or not by chance."""
     corner = fine.faces.reshape(-1)
     count = np.maximum(np.bincount(corner, minlength=len(fine.vertices)), 1)
-    middles = np.repeat(fine.middles, 3, axis=0)
+    middles = np.repeat(fine.centres, 3, axis=0)
     sums = [np.bincount(corner, middles[:, a], len(fine.vertices)) for a in range(3)]
     return fine.vertices + _INWARD * (np.stack(sums, axis=1) / count[:, None] - fine.vertices)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.surface.tool_clearance import accessible_region, has_clearance
 from nrdf.toolpath.planners.distance import distance_from
-from nrdf.toolpath.planners.fine_mesh import FineMesh, refine
 from nrdf.toolpath.strategy import Strategy
 
 _PER_RADIUS = 4.0  # samples along the tool's radius

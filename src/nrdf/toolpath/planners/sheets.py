@@ -14,10 +14,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from nrdf.geometry.frames import unit_vectors
+from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.field_lines import Part
-from nrdf.toolpath.planners.fine_mesh import FineMesh
 from nrdf.toolpath.strategy import Strategy
 
 _CREASE = float(np.cos(np.radians(30.0)))
