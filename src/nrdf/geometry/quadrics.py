@@ -25,7 +25,7 @@ def quadrics(offset: np.ndarray, values: np.ndarray, weight: np.ndarray) -> np.n
     weight = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
     weighted = basis * weight[:, None]
     normal = weighted @ basis.transpose(0, 2, 1)
-    normal += _KEPT_SMALL
+    normal += _KEPT_SMALL.astype(normal.dtype)
     return np.linalg.solve(normal, weighted @ values)
 
 

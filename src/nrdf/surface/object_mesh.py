@@ -9,14 +9,14 @@ from nrdf.io.cloud import PointCloud
 from nrdf.surface.scan_mesh import mesh_from_scan
 from nrdf.surface.target_mesh import TargetMesh
 
-_EDGES_PER_RADIUS = 8  # of the tool: finer than it can follow only costs time
+_EDGES_PER_RADIUS = 5  # of the tool: finer than it can follow only costs time
 
 
 def object_mesh(cloud: PointCloud, tool_radius_m: float) -> TargetMesh:
     """The surface of an object in metres, at its own resolution, faces outward.
 
     A cloud that was sampled from a mesh (`cloud.mesh`) has that mesh's outer skin. Any other one
-    has the mesh through its points (`nrdf.surface.scan_mesh`), with edges of an eighth of the
+    has the mesh through its points (`nrdf.surface.scan_mesh`), with edges of a fifth of the
     tool's radius, m, or of the distance between its points where that is more; holes stay open
     where it has no points. `repairs` of what is returned says what was changed.
 

@@ -12,16 +12,16 @@ from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
+from nrdf.io.cloud import PointCloud
 from nrdf.scans.simulate import ScanSettings, simulate_scan
+from nrdf.surface.object_mesh import object_mesh
 from nrdf.surface.region_mesh import RegionMesh, region_mesh
-from nrdf.surface.scan_mesh import mesh_from_scan
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf_benchmark.mesh_paths.targets import MeshTarget
 
 SurfaceKind = Literal["mesh", "votes", "scan"]
 SCAN = ScanSettings(views=3, pixels=800, noise=0.001)
 SCAN_POINTS = 200_000
-_EDGES_PER_RADIUS = 8  # of the tool, of a scan's mesh
 
 
 def regions_on(target: MeshTarget, kind: SurfaceKind) -> Callable[[str], RegionMesh]:
@@ -39,7 +39,7 @@ def regions_on(target: MeshTarget, kind: SurfaceKind) -> Callable[[str], RegionM
         points, normals, face = target.skin.points, target.skin.normals, target.skin.face
     else:
         points, normals, face = scan_of(target)
-        mesh = mesh_from_scan(points, normals, target.strategy.tool_radius_m / _EDGES_PER_RADIUS)
+        mesh = object_mesh(PointCloud(points, normals, "m"), target.strategy.tool_radius_m)
     kept = downsample(points, WORKING_POINTS, np.random.default_rng(0))
     radius = target.strategy.tool_radius_m
 
