@@ -8,7 +8,9 @@ from __future__ import annotations
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
 from nrdf.toolpath.planners.level_lines import MeshLine
+from nrdf.toolpath.planners.raster import is_needed
 from nrdf.toolpath.planners.sheet_lines import across_directions, line_direction, usual_length
+from nrdf.toolpath.planners.sheets import sheets_of
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -19,12 +21,15 @@ _BETTER = 2.0
 def plan_plane_slices(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """Lines of parallel planes, as slicers draw them: even in space, not along the surface.
 
+    Every sheet of the region, as the top, underside and edges of a slab, is sliced by itself.
     Where the surface turns away from the planes' normal, lines are farther apart than the stepover;
     `nrdf.toolpath.planners.raster` keeps them even. Raises ProcessError as the raster does.
     """
-    found = []
+    found: list[SurfacePath] = []
     for part in parts_of(region, strategy):
-        found += driven(region, part, _sliced(part, strategy), strategy)
+        for sheet in sheets_of(region, part, strategy):
+            if is_needed(region, sheet, found, strategy):
+                found += driven(region, sheet, _sliced(sheet, strategy), strategy)
     return checked(found, strategy)
 
 

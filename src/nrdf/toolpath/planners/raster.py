@@ -31,7 +31,7 @@ def plan_raster(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """
     found: list[SurfacePath] = []
     for sheet in _sheets(region, strategy):
-        if _is_needed(region, sheet, found, strategy):
+        if is_needed(region, sheet, found, strategy):
             found += _sheet_paths(region, sheet, strategy, found)
     return checked(found, strategy)
 
@@ -41,7 +41,7 @@ def plan_cross_hatch(region: RegionMesh, strategy: Strategy) -> list[SurfacePath
     found: list[SurfacePath] = []
     across: list[SurfacePath] = []
     for sheet in _sheets(region, strategy):
-        if _is_needed(region, sheet, found, strategy):
+        if is_needed(region, sheet, found, strategy):
             found += _sheet_paths(region, sheet, strategy, found)
             along = line_direction(sheet, strategy.direction)
             outward = sheet.axes[2] if sheet.outward is None else sheet.outward
@@ -80,7 +80,7 @@ def _sheets(region: RegionMesh, strategy: Strategy) -> list[Part]:
     return [sheet for part in parts for sheet in sheets_of(region, part, strategy)]
 
 
-def _is_needed(
+def is_needed(
     region: RegionMesh, sheet: Part, paths: Sequence[SurfacePath], strategy: Strategy
 ) -> bool:
     """Whether a sheet that is no larger than a few footprints has area that no path reaches yet."""
