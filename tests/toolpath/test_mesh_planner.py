@@ -137,5 +137,14 @@ def test_what_leads_off_the_surface_does_so_by_as_much_as_asked():
     assert line.positions[:, 2] == pytest.approx(0.0)
 
 
+def test_the_contact_keeps_the_feed_where_asked():
+    given = {"standoff_m": 0.06, "trajectory": "plane-slices", "line_order": "snake"}
+    across = np.array([0.0, 1.0, 0.0])
+    for line in planned(tube(share=0.5), **given, direction=across, constant_speed=True):
+        worked = total_length(contact_points(line, replace(STRATEGY, **given)))
+        assert worked / total_length(line.positions) * line.feed_m_s == pytest.approx(0.1, rel=1e-6)
+        assert abs(line.feed_m_s - 0.1) > 0.01
+
+
 def test_every_modifier_has_a_name():
     assert {"run-off", "join", "edge-contact", "approach-retract", "offset"} < set(MODIFIERS)

@@ -43,7 +43,7 @@ def test_a_direction_is_three_numbers_that_are_not_all_zero():
 
 
 def test_only_a_zigzag_joins_its_lines_unless_a_gap_is_given():
-    assert Strategy(stepover_m=0.03).joined_gap_m == 0.06
+    assert Strategy(stepover_m=0.03).joined_gap_m == pytest.approx(0.09)
     assert Strategy(line_order="snake").joined_gap_m == 0.0
     assert Strategy(line_order="snake", join_gap_m=0.01).joined_gap_m == 0.01
     assert Strategy(tool_radius_m=0.02).least_line_m == 0.02

@@ -98,11 +98,11 @@ def test_given_lines_are_driven_as_they_are_and_turned_around_on_the_way_back():
     positions, held = np.zeros((1, 3)), Rotation.from_euler("x", np.pi).as_quat()[None]
     normals = [np.array([[0.0, 0.0, 1.0]])]
     given = [Segment("process", 0, positions, held, 0.1)]
-    segments = add_approach_retract(given, normals, replace(STRATEGY, passes=2, feed_m_s=0.3))
+    segments = add_approach_retract(given, normals, replace(STRATEGY, passes=2))
     assert [segment.kind for segment in segments] == ["approach", "process", "retract"] * 2
     np.testing.assert_array_equal(segments[1].quaternions_xyzw, held)
     np.testing.assert_allclose(segments[0].positions[0], [0.0, 0.0, 0.05])
-    assert (segments[1].feed_m_s, segments[4].line) == (0.3, 1)
+    assert (segments[1].feed_m_s, segments[4].line) == (0.1, 1)
     back = Rotation.from_quat(segments[4].quaternions_xyzw).as_matrix()[0]
     np.testing.assert_allclose(back[:, 0], [-1.0, 0.0, 0.0], atol=1e-9)
     with pytest.raises(ProcessError, match="Give fewer passes"):

@@ -140,7 +140,7 @@ class Process(Quantities):
     """Shorter lines are left out where nothing is lost with them; unless given, the tool's
     radius."""
     join_gap_m: Annotated[NotNegative | None, _LENGTH] = None
-    """Lines whose ends are that near are joined on the surface; unless given, two stepovers for a
+    """Lines whose ends are that near are joined on the surface; unless given, three stepovers for a
     zigzag, else 0."""
     passes: Annotated[int, Field(ge=1, le=1000), PlausibleRange(1, 100)] = 1
     """How often the region is worked."""
@@ -172,8 +172,8 @@ class Process(Quantities):
     feed_m_s: Annotated[Positive, _FEED]
     """Speed of the tool centre point along the lines."""
     constant_speed: bool = False
-    """Whether the feed is that of the contact instead: around bends the tool centre point is then
-    driven faster or slower."""
+    """Whether the feed is that of the contact instead: lines around bends are then driven faster or
+    slower as a whole."""
     spindle_rad_s: Annotated[NotNegative | None, PlausibleRange(0.0, 100_000 * math.pi / 30)] = None
     """Speed of the spindle."""
     dwell_s: Annotated[NotNegative, PlausibleRange(0.0, 3600.0)] = 0.0

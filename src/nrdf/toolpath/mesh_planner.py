@@ -13,6 +13,7 @@ from nrdf.surface.tool_clearance import accessible_region
 from nrdf.toolpath.line_direction import line_axes, with_direction
 from nrdf.toolpath.modifiers import (
     chord_error,
+    constant_speed,
     drag,
     edge_contact,
     join,
@@ -26,13 +27,14 @@ from nrdf.toolpath.modifiers import (
     start_at,
 )
 from nrdf.toolpath.modifiers.join import Project
+from nrdf.toolpath.modifiers.order import Lift
 from nrdf.toolpath.modifiers.run_off import Free
 from nrdf.toolpath.planners import PLANNERS, Planner
 from nrdf.toolpath.region_samples import sample_evenly
 from nrdf.toolpath.size_limits import check_passes, check_size
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
-from nrdf.toolpath.tool_segments import add_approach_retract, steady_tool_segments
+from nrdf.toolpath.tool_segments import add_approach_retract, contact_points, steady_tool_segments
 from nrdf.toolpath.types import Segment
 
 _LARGEST_STEP = 2.0  # spacings inside a line
@@ -67,6 +69,8 @@ def plan_on_mesh(
     ]
     lines, normals = steady_tool_segments([path for once in passes for path in once], strategy)
     lines = edge_contact(lines, strategy.edge_contact_m, strategy.lead_rad, strategy.tilt_rad)
+    if strategy.constant_speed:
+        lines = constant_speed(lines, [contact_points(line, strategy) for line in lines])
     return add_approach_retract(lines, normals, replace(strategy, passes=1))
 
 
@@ -91,8 +95,7 @@ def modified(
         way = project if strategy.run_off_m == 0.0 else _straight
         joined = join(paths, way, spacing, strategy.joined_gap_m)
         steady = smooth_orientation(split(joined, step), turn)
-        lift = max(strategy.retract_distance_m, radius)
-        paths = order_shortest(steady, strategy.line_order == "one-way", lift)
+        paths = order_shortest(steady, strategy.line_order == "one-way", _lift(strategy))
     dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
     return offset(dragged, strategy.offset_m)
 
@@ -111,7 +114,12 @@ def in_order(
         towards = along if strategy.start.startswith("far") else -along
         towards = towards + (left if strategy.start.endswith("left") else -left)
         paths = start_at(paths, towards, may_turn=not one)
-    return order_shortest(paths, one, max(strategy.retract_distance_m, strategy.tool_radius_m))
+    return order_shortest(paths, one, _lift(strategy))
+
+
+def _lift(strategy: Strategy) -> Lift:
+    height = max(strategy.retract_distance_m, strategy.tool_radius_m)
+    return Lift(height, strategy.joined_gap_m)
 
 
 def _projection(region: RegionMesh, strategy: Strategy) -> Project:

@@ -61,7 +61,7 @@ class Strategy:
     largest_turn_rad_m: of the tool's axis, for each m of the way. chord_error_m: of the straight
     way between waypoints, 0 where they are evenly spaced. minimum_length_m: shorter lines go where
     nothing is lost with them; None: the tool's radius. join_gap_m: the widest gap that is joined on
-    the surface; None: two stepovers for a zigzag, else 0. constant_speed: the feed is that of the
+    the surface; None: three stepovers for a zigzag, else 0. constant_speed: the feed is that of the
     contact, not of the tool centre point.
     passes: the lines are driven that often, back and forth. Approach and retract: length of the
     free moves before and after a line, their angle from the normal (0: along the normal; pi/2:
@@ -136,4 +136,4 @@ class Strategy:
         """The widest gap between lines that is driven on the surface."""
         if self.join_gap_m is not None:
             return self.join_gap_m
-        return 2.0 * self.stepover_m if self.line_order == "zigzag" else 0.0
+        return 3.0 * self.stepover_m if self.line_order == "zigzag" else 0.0

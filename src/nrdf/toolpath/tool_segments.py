@@ -74,8 +74,8 @@ def add_approach_retract(
 ) -> tuple[Segment, ...]:
     """Process segments in the given order, each with its approach and retract, for all passes.
 
-    lines: process segments; feed, force and dwell are the strategy's. normals: (n, 3), outward, of
-    the surface under the waypoints of each. Every second pass goes backwards; where the tool's
+    lines: process segments; their force and dwell become the strategy's. normals: (n, 3), outward,
+    of the surface under the waypoints of each. Every second pass goes backwards; where the tool's
     heading follows the travel, it is then turned half around the normal. Raises ProcessError for
     too many of them.
     """
@@ -88,14 +88,11 @@ def add_approach_retract(
             if index % 2:
                 line, outward = _backwards(line, outward, strategy), outward[::-1]
             driven.append(
-                replace(
-                    line,
-                    line=len(driven),
-                    feed_m_s=strategy.feed_m_s,
-                    force_n=strategy.force_n,
-                    dwell_s=strategy.dwell_s,
+                Segment(
+                    "process", len(driven), line.positions, line.quaternions_xyzw, line.feed_m_s,
+                    strategy.force_n, strategy.dwell_s,
                 )
-            )
+            )  # fmt: skip
             under.append(outward)
     approach = FreeMove(
         strategy.approach_distance_m,

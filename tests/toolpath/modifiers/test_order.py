@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builders.surface_paths import rows, straight
-from nrdf.toolpath.modifiers.order import order_nearest, order_shortest, way_between
-from nrdf.toolpath.surface_path import SurfacePath
+from builders.surface_paths import UP, rows, straight
+from nrdf.toolpath.modifiers.order import Lift, order_nearest, order_shortest, way_between
 
 PLACES = np.arange(6) * 0.02
 
@@ -54,20 +53,30 @@ def test_turning_runs_around_shortens_what_the_nearest_next_leaves_for_last():
             assert way_between(other) > way_between(shortest) - 1e-5
 
 
-def test_lines_of_one_way_are_never_turned():
-    given = rows(PLACES[[0, 3, 1, 5, 2, 4]])
-    assert {id(path) for path in order_shortest(given, one_way=True)} == {id(p) for p in given}
-    assert order_shortest(given[:1]) == given[:1]
+def test_where_lifting_counts_the_next_line_on_the_same_side_comes_before_a_nearer_one_behind():
+    top = rows([0.0, 0.03])
+    behind = straight((0.2, 0.01, -0.005), (0.0, 0.01, -0.005), normal=-UP)
+    assert order_nearest([top[0], behind, top[1]])[1] is behind
+    made = order_shortest([top[0], behind, top[1]], lift=Lift(0.05, 0.05))
+    assert made[1].contacts[0] == pytest.approx([0.2, 0.03, 0.0])
+    far = Lift(0.05, 0.02)
+    assert way_between([top[0], top[1]], far) == pytest.approx(0.1 + np.hypot(0.2, 0.03))
+    assert way_between([top[0], top[1].reversed()], Lift(0.05, 0.05)) == pytest.approx(0.03)
+    thin = [top[0], straight((0.2, 0, -0.005), (0, 0, -0.005), normal=-UP)]
+    assert way_between(thin, Lift(0.05)) == pytest.approx(0.105 + 0.1)
 
 
 def test_the_two_sides_of_a_thin_sheet_are_driven_one_after_the_other():
     def side(height, up):
         return [
-            SurfacePath(
-                np.array([[0.0, y, height], [0.5, y, height]]), np.tile([0.0, 0.0, up], (2, 1))
-            )
-            for y in (0.0, 0.02, 0.04)
+            straight((0.0, y, height), (0.5, y, height), normal=up * UP) for y in (0.0, 0.02, 0.04)
         ]
 
-    found = order_shortest([*side(0.005, 1.0), *side(0.0, -1.0)], lift_m=0.05)
+    found = order_shortest([*side(0.005, 1.0), *side(0.0, -1.0)], lift=Lift(0.05))
     assert [float(path.normals[0, 2]) for path in found] == [1.0] * 3 + [-1.0] * 3
+
+
+def test_lines_of_one_way_are_never_turned():
+    given = rows(PLACES[[0, 3, 1, 5, 2, 4]])
+    assert {id(path) for path in order_shortest(given, one_way=True)} == {id(p) for p in given}
+    assert order_shortest(given[:1]) == given[:1]

@@ -11,6 +11,7 @@ from typing import Any
 
 from nrdf.toolpath.modifiers.approach_retract import approach_retract
 from nrdf.toolpath.modifiers.chord_error import chord_error
+from nrdf.toolpath.modifiers.constant_speed import constant_speed
 from nrdf.toolpath.modifiers.join import join
 from nrdf.toolpath.modifiers.minimum_length import minimum_length
 from nrdf.toolpath.modifiers.offset import drag, edge_contact, offset
@@ -42,6 +43,7 @@ PATH_MODIFIERS: dict[str, Callable[..., list[SurfacePath]]] = {
 
 SEGMENT_MODIFIERS: dict[str, Callable[..., list[Segment]]] = {
     "edge-contact": edge_contact,
+    "constant-speed": constant_speed,
     "approach-retract": approach_retract,
 }
 """Each takes process segments, then its settings by name."""
