@@ -72,3 +72,10 @@ def test_a_submesh_has_the_chosen_faces_only():
     top = mesh.submesh(mesh.face_normals[:, 2] > 0.5)
     assert (len(top.vertices), len(top.faces)) == (4, 2)
     assert (top.vertices[:, 2] == 0.5).all() and (top.face_normals[:, 2] > 0.9).all()
+
+
+def test_smooth_normals_are_finite_beside_a_face_without_area():
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (5, 5, 5), (5, 5, 5), (5, 5, 5)], float)
+    mesh = TargetMesh(vertices, np.array([(0, 1, 2), (3, 4, 5)]))
+    normals = mesh.smooth_normals(np.array([[0.3, 0.3, 0.0]]), np.array([0]), 0.2)
+    assert np.allclose(normals, [[0.0, 0.0, 1.0]])

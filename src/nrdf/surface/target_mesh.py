@@ -192,6 +192,8 @@ class TargetMesh:
         key = ("patches", size)
         if key not in self._found:
             middles, face, areas = _split_to_size(self.vertices[self.faces], size)
+            real = areas > 0.0  # needles have no side, and no middle that their area could weigh
+            middles, face, areas = middles[real], face[real], areas[real]
             normals = self.face_normals[face]
             # One patch for each cell and side that the normals look to.
             cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
