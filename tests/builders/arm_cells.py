@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import trimesh
 
+from nrdf.geometry.mesh import Mesh
 from nrdf.robot.model.cell import Cell, Placement, upright_rotation
 from nrdf.robot.model.signed_distance import distance_field_from_points
 from nrdf.robot.model.tool import tool_of
 from nrdf.robot.planning.inverse_kinematics import SeedLibrary
-from nrdf.surface.surface import Surface
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.types import Segment, ToolPath
 
 UP = upright_rotation(*np.eye(3)[[1, 0]])
@@ -55,7 +57,7 @@ def block(low, high, count, rng):
 
 
 class WallScene(NamedTuple):
-    """cell: Cell, library: SeedLibrary, path: ToolPath, surface: Surface."""
+    """cell: Cell, library: SeedLibrary, path: ToolPath, surface: TargetMesh."""
 
     cell: Any
     library: Any
@@ -74,4 +76,13 @@ def wall_scene(arm) -> WallScene:
     x = np.linspace(-0.05, WALL_M - 0.0165, 12)
     path = path_of(np.stack([x, np.full(12, 0.03), np.zeros(12)], axis=1))
     cell = cell_with(arm, path, distance_field_from_points(points, normals), WALL_PLACE)
-    return WallScene(cell, SeedLibrary.build(cell, 20_000, rng), path, Surface(points, normals))
+    parts = [
+        trimesh.creation.box(bounds=bounds)
+        for bounds in (
+            ((-0.15, 0.0, -0.1), (WALL_M, 0.03, 0.1)),
+            ((WALL_M, 0.0, -0.1), (WALL_M + 0.03, 0.12, 0.1)),
+        )
+    ]
+    mesh = trimesh.util.concatenate(parts)
+    surface = TargetMesh.from_mesh(Mesh(np.array(mesh.vertices), np.array(mesh.faces)))
+    return WallScene(cell, SeedLibrary.build(cell, 20_000, rng), path, surface)

@@ -45,8 +45,8 @@ def simulate(
         stand: Height of the object above the floor, where the base is given.
         turns: Turns of the turntable to choose from (12); 1 for an object that stays as it is, as
             it does unless given where the base is given.
-        mesh: Mesh of the object in metres, in the job's frame, for collisions; the scan unless
-            given.
+        mesh: Mesh of the object in metres, in the job's frame, which the arm meets; the job's own
+            mesh unless given, or one of all its points.
         up: Direction in the job's frame that points up; as the job says unless given.
         shift_mm: Put the object off its place by x y z in millimetres, in its own frame, to try the
             force control.
@@ -68,7 +68,10 @@ def simulate(
         for line in arm.checked:
             console.print(line, style="dim")
         given, count = _placement(base, stand, turns)
-        distance_field = None if mesh is None else distance_field_from_file(mesh, work.points)
+        distance_field = None
+        if mesh is not None:
+            distance_field = distance_field_from_file(mesh, work.points)
+            work = work.with_mesh(mesh)
         with errors.status("simulation") as status:
             shift = tuple(x / 1e3 for x in shift_mm)
             done = run(work, arm, distance_field, given, count, shift, seed, status.update)

@@ -24,14 +24,20 @@ def test_pictures_show_arm_and_object(plate, tmp_path):
     assert ((coverage[..., 1] > 1.5 * coverage[..., 0]) & (coverage[..., 1] > 0.2)).mean() > 0.01
 
 
-def test_the_mesh_is_cut_by_colour_and_stays_whole(plate):
+def test_the_mesh_is_whole_and_its_region_above_it_is_cut_by_colour(plate):
     parts = _parts(plate, "coverage")
-    assert len(parts) == 3, "not in a region, worked, and not worked"
-    faces = sum(len(faces) for _, faces, _ in parts)
-    assert faces == pytest.approx(len(plate.distance_field.faces), abs=9)
+    assert len(parts) == 3, "the object, worked, and not worked"
+    region = plate.simulation_job.surfaces.regions["top"]
+    area = sum(_area(vertices, faces) for vertices, faces, _ in parts[1:])
+    assert area == pytest.approx(region.area_m2, rel=0.02)
     for vertices, faces, colour in parts:
         assert faces.max() == len(vertices) - 1 and len(colour) == 3
-    assert np.isfinite(parts[0][0]).all()
+    assert parts[1][0][:, 1].min() > plate.simulation_job.surfaces.given.vertices[:, 1].max() - 1e-4
+
+
+def _area(vertices, faces):
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
 
 
 def test_a_picture_on_a_full_disk_is_an_output_error(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ def run_it(wall, paths, shift):
     home = find_home(wall.cell, wall.library)
     return run(
         wall.cell, "top", wall.path.groups, paths, home, wall.library, rng, wall.surface,
-        np.array(shift),
+        wall.surface, np.array(shift),
     )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ from nrdf.robot.model.cell import Placement
 from nrdf.robot.simulation.execute import execute, heights
 from nrdf.robot.simulation.job import read_simulation_job
 from nrdf.robot.simulation.simulate import simulate
-from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import surface_frames
 from nrdf.toolpath.types import Segment
 
@@ -35,7 +34,7 @@ def test_force_is_kept_over_a_bend_that_few_waypoints_tell(arm, tmp_path):
 
 def test_heights_are_where_the_shifted_surface_is(plate_job):
     job = read_simulation_job(plate_job)
-    surface = Surface(job.points, job.normals)
+    surface = job.surfaces.given
     positions = np.array([[0.0, 0.42, 0.0], [0.05, 0.425, 0.02], [0.0, 0.6, 0.0]])
     down = np.tile([0.0, -1.0, 0.0], (3, 1))
     found = heights(positions, down, surface, np.array([0.0, 0.003, 0.0]))
@@ -46,7 +45,7 @@ def test_actions_that_are_known_are_not_executed_again(plate):
     path = plate.paths[0]
     actions = path.program.actions[:2]
     logs = dict(zip(map(id, actions), path.logs[:2], strict=True))
-    surface = Surface(plate.simulation_job.points, plate.simulation_job.normals)
-    again = execute(path.cell, actions, surface, np.zeros(3), {id(actions[0]): path.logs[0]})
+    mesh = plate.simulation_job.surfaces.given
+    again = execute(path.cell, actions, mesh, mesh, np.zeros(3), {id(actions[0]): path.logs[0]})
     assert again[0] is path.logs[0] and again[1] is not logs[id(actions[1])]
     np.testing.assert_allclose(again[1].joints[-1], path.logs[1].joints[-1], atol=1e-4)

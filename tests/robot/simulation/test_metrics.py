@@ -7,7 +7,6 @@ import pytest
 
 from nrdf.robot.planning.reachability import Reachability
 from nrdf.robot.simulation.metrics import VERDICTS, measure_path
-from nrdf.surface.surface import Surface
 
 
 def measured(plate, **changes):
@@ -16,7 +15,7 @@ def measured(plate, **changes):
     whole = [np.ones(9, bool)] * 3
     given = {"strategy": path.strategy, "program": path.program, **changes}
     return measure_path(
-        job.bound_knowledge.regions["top"], Surface(job.points, job.normals), path.path,
+        job.surfaces.regions["top"], path.path,
         given["strategy"], path.cell, given["program"], whole, [Reachability(*whole)] * 3,
         path.logs,
     )  # fmt: skip

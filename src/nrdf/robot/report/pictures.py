@@ -13,11 +13,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.geometry.frames import quaternions_wxyz
+from nrdf.geometry.simplify import simplified
 from nrdf.io.atomic import write_atomically
 from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.robot.simulation.scene import cell_specification
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
+from nrdf.surface.target_mesh import TargetMesh
+from nrdf.toolpath.planners.fine_mesh import refine
 from nrdf.viz.palette import (
     COVERED,
     LEFT_OUT,
@@ -33,6 +36,8 @@ log = logging.getLogger(__name__)
 FILM, STILL, COVERAGE = "film.webp", "picture.png", "coverage.png"
 _SIZE, _FILM_SIZE = (1080, 810), (520, 400)
 _FRAMES, _FRAME_MS = 90, 120
+_MOST_FACES = 60_000  # of a part that is drawn
+_LIFT_M = 0.0005  # of regions above the object
 
 
 def draw_pictures(
@@ -238,43 +243,43 @@ def _build(
 def _parts(
     result: SimulationResult, colours: str
 ) -> list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
-    """The object's mesh cut by colour: vertices, faces and colour of each part."""
-    distance_field, bound_knowledge = result.distance_field, result.simulation_job.bound_knowledge
-    points = bound_knowledge.cloud.points
-    label = np.zeros(len(points), int)
-    palette: list[tuple[float, ...]] = [NO_REGION]
-    if colours == "regions":
-        inks = region_colours(list(bound_knowledge.regions))
-        for number, name in enumerate(bound_knowledge.regions, 1):
-            label[bound_knowledge.regions[name]] = number
-            palette.append(tuple(0.55 * inks[name] + 0.45))
-    else:
-        palette += [COVERED, NOT_COVERED, LEFT_OUT]
-        for simulated in result.paths:
-            metrics = simulated.metrics
-            found = np.where(metrics.worked, 1, np.where(metrics.wanted, 2, 3))
-            region = bound_knowledge.regions[simulated.path.region]
-            on_surface = result.simulation_job.surface.points[metrics.region_points]
-            nearest = cKDTree(on_surface).query(points[region])[1]
-            label[region] = found[nearest]
-    normals = bound_knowledge.cloud.normals
-    corners = distance_field.vertices[distance_field.faces]
-    middle = corners.mean(axis=1)
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-15)
-    distance, near = cKDTree(points).query(middle, 6)
-    if normals is not None:
-        # On a thin part the nearest point may be of the other side.
-        alike = np.einsum("fka,fa->fk", normals[near], facing)
-        distance = distance + 0.02 * (1.0 - alike)
-    owner = label[near[np.arange(len(near)), distance.argmin(axis=1)]]
-    made = []
-    for number, colour in enumerate(palette):
-        faces = distance_field.faces[owner == number]
+    """The object's mesh, and above it its regions by colour: vertices, faces and colour of each."""
+    surfaces = result.simulation_job.surfaces
+    made: list[tuple[np.ndarray, np.ndarray, tuple[float, ...]]] = []
+
+    def add(mesh: TargetMesh, faces: np.ndarray, colour: tuple[float, ...], lift: float) -> None:
         if len(faces) >= 4:
             used, index = np.unique(faces, return_inverse=True)
-            made.append((distance_field.vertices[used], index.reshape(-1, 3), colour))
+            lifted = mesh.vertices[used] + lift * mesh.vertex_normals[used]
+            made.append((*simplified(lifted, index.reshape(-1, 3), _MOST_FACES), colour))
+
+    add(surfaces.given, surfaces.given.faces, NO_REGION, 0.0)
+    if colours == "regions":
+        inks = region_colours(list(surfaces.regions))
+        for name, region in surfaces.regions.items():
+            add(region.mesh, region.mesh.faces, tuple(0.55 * inks[name] + 0.45), _LIFT_M)
+        return made
+    for simulated in result.paths:
+        metrics, region = simulated.metrics, surfaces.regions[simulated.path.region]
+        fine = refine(region.mesh.vertices, region.mesh.faces, simulated.path.tool_radius_m / 3)
+        mesh = TargetMesh(fine.vertices, fine.faces)
+        middles = mesh.vertices[mesh.faces].mean(axis=1)
+        samples = metrics.samples
+        # On a thin part the nearest sample may be of the other side.
+        near = _nearest_alike(samples.points, samples.normals, middles, mesh.face_normals)
+        label = np.where(metrics.worked, 0, np.where(samples.wanted, 1, 2))[near]
+        for number, colour in enumerate((COVERED, NOT_COVERED, LEFT_OUT)):
+            add(mesh, mesh.faces[label == number], colour, _LIFT_M)
     return made
+
+
+def _nearest_alike(
+    points: np.ndarray, normals: np.ndarray, places: np.ndarray, facing: np.ndarray
+) -> np.ndarray:
+    """Index (m,) of the nearest of points (k, 3) that look the way places (m, 3) do."""
+    distance, near = cKDTree(points).query(places, min(6, len(points)))
+    away = distance + 0.02 * (1.0 - np.einsum("fka,fa->fk", normals[near], facing))
+    return np.asarray(near[np.arange(len(near)), away.argmin(axis=1)])
 
 
 def _add_lines(scene: Any, simulated: SimulatedPath, pose: np.ndarray) -> None:

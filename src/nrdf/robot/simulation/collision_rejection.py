@@ -19,7 +19,7 @@ from nrdf.robot.planning.joint_path import JointPath, densify
 from nrdf.robot.planning.program import Action, PathProgram, ProgramPlanner
 from nrdf.robot.simulation.collision import Collision, TimedCollision, find_collisions
 from nrdf.robot.simulation.execute import ExecutionLog, execute
-from nrdf.surface.surface import Surface
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.types import SegmentGroup
 
 _MAX_RUNS = 6
@@ -47,14 +47,15 @@ def run(
     home: np.ndarray,
     library: SeedLibrary,
     rng: np.random.Generator,
-    surface: Surface,
+    surface: TargetMesh,
+    planned: TargetMesh,
     shift_m: np.ndarray,
     clock: Callable[[str], None] = lambda phase: None,
 ) -> PathRun:
     """Plan, execute and check joint paths, until nothing that is left collides.
 
-    shift_m: (3,) by which the object is shifted, in its own frame; clock is told each phase as it
-    ends.
+    surface, planned: the object's true mesh and the one that was planned on. shift_m: (3,)
+    by which the object is shifted, in its own frame; clock is told each phase as it ends.
     """
     planner = ProgramPlanner(cell, groups, home, library, rng)
     shifted = cell.shifted(shift_m)
@@ -64,7 +65,7 @@ def run(
     for round_ in range(_MAX_RUNS):
         program = planner.program(paths, in_order=round_ > 0)
         clock("free moves")
-        executed = execute(cell, program.actions, surface, shift_m, logs)
+        executed = execute(cell, program.actions, surface, planned, shift_m, logs)
         clock("simulation")
         fresh = [log for log in executed if id(log.action) not in logs]
         logs |= {id(log.action): log for log in fresh}

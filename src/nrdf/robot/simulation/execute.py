@@ -2,11 +2,11 @@
 
 The arm is MuJoCo's, with its inertia, motors and force sensor. The surface pushes on the tool's
 soft pad as a spring and damper along the tool's axis, with friction against the travel, where the
-object's smooth surface really is: a shifted object is met where it has been shifted to. The
+object's true mesh is: a shifted object is met where it has been shifted to. The
 controller is an admittance: it moves the tool along its axis at a speed in proportion to the error
 of the force that the sensor measures (Siciliano et al., Robotics, 2009, chapter 9). How far the pad
-reaches between waypoints and over bends is known from the scan, and fed forward; where the object
-is not where it was scanned, that is wrong, and only the force corrects it.
+reaches between waypoints and over bends is known from the mesh that was planned on, and fed
+forward; where the object is not like it, or not there, only the force corrects that.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from nrdf.robot.model.tool import PAD_GIVE_M
 from nrdf.robot.planning.program import Action
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.scene import SimulatedArm
-from nrdf.surface.surface import Surface
+from nrdf.surface.target_mesh import TargetMesh
 
 SETTLED_SHARE, SETTLING_S = 0.1, 1.5
 """The tool waits at a line's start until the force is that close, for at most that long."""
@@ -35,6 +35,8 @@ _DAMPING_S = 0.004  # of the pad, as a share of its stiffness
 _FRICTION = 0.2
 _SAMPLE_M, _SAMPLE_RAD = 0.003, np.radians(4.0)  # between samples of the surface
 _LOST_M = 0.02  # a surface farther from the plan than this does not count
+_BEFORE_M = (0.02, 0.006, 0.002)
+"""Where it is looked for from: as far before the plan as nothing else stands there."""
 _FLATTEST = 0.3  # least cosine between the tool's axis and the surface's inward normal
 
 
@@ -61,15 +63,17 @@ class ExecutionLog:
 def execute(
     cell: Cell,
     actions: Sequence[Action],
-    surface: Surface,
+    surface: TargetMesh,
+    planned: TargetMesh,
     shift_m: np.ndarray,
     known: Mapping[int, ExecutionLog] = MappingProxyType({}),
 ) -> list[ExecutionLog]:
     """Execute actions in simulation.
 
-    shift_m: (3,) by which the object is shifted, in its own frame. known: logs of actions, by the
-    action's id, that need not be executed again: each action begins at rest, where the one before
-    it ends.
+    surface: the object's true mesh; planned: the one that was planned on, which tells what to
+    expect. shift_m: (3,) by which the object is shifted, in its own frame. known: logs of actions,
+    by the action's id, that need not be executed again: each action begins at rest, where the one
+    before it ends.
     """
     if not actions:
         return []
@@ -85,7 +89,7 @@ def execute(
             arm.start(action.timed.joints[0])
             offset, there = 0.0, True
         if action.kind == "process" and action.force_n is not None:
-            log, offset = _press(arm, cell, action, surface, shift_m)
+            log, offset = _press(arm, cell, action, surface, planned, shift_m)
         else:
             log, offset = _move(arm, cell, action, offset)
         logs.append(log)
@@ -185,7 +189,8 @@ def _press(
     arm: SimulatedArm,
     cell: Cell,
     action: Action,
-    surface: Surface,
+    surface: TargetMesh,
+    planned: TargetMesh,
     shift_m: np.ndarray,
 ) -> tuple[ExecutionLog, float]:
     """A joint path under force; its log, and how far along its axis the tool was off at the end."""
@@ -194,8 +199,7 @@ def _press(
     wanted = float(action.force_n or 0.0)
     stiffness = max(wanted, 1.0) / PAD_GIVE_M
     gap = _gaps(motion, cell, action, surface, shift_m)
-    planned_gap = gap if not shift_m.any() else _gaps(motion, cell, action, surface, 0.0 * shift_m)
-    expected = _expected(planned_gap)
+    expected = _expected(_gaps(motion, cell, action, planned, 0.0 * shift_m))
     rising = np.gradient(expected, STEP_S) if count > 1 else 0.0 * expected
     travel = np.gradient(motion.positions, axis=0) if count > 1 else np.zeros((1, 3))
     travel /= np.maximum(np.linalg.norm(travel, axis=1, keepdims=True), 1e-9)
@@ -209,9 +213,9 @@ def _press(
     tip, axis = arm.tip()
     still = np.zeros(motion.joints.shape[1])
     while True:
-        planned = motion.axes[i]
+        inward = motion.axes[i]
         away = tip - motion.positions[i]
-        depth = float(away @ planned)
+        depth = float(away @ inward)
         # The spring between the surface and where the pad's face really is.
         sunk = depth - gap[i]
         rate = (sunk - before) / STEP_S
@@ -219,7 +223,7 @@ def _press(
         push = stiffness * (sunk + _DAMPING_S * rate) if sunk > 0.0 else 0.0
         pushed = None
         if push > 0.0:
-            pushed = -push * planned - (_FRICTION * push if working else 0.0) * travel[i]
+            pushed = -push * inward - (_FRICTION * push if working else 0.0) * travel[i]
         moving = working and i < count - 1
         offset = expected[i] + correction
         arm.step(
@@ -233,7 +237,7 @@ def _press(
         force = arm.force(axis)
         correction += min(max(gain * (wanted - force), -most), most)
         correction = min(max(correction, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
-        aside = away - depth * planned
+        aside = away - depth * inward
         record.add(
             arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i], moving
         )
@@ -259,7 +263,7 @@ def _expected(gap: np.ndarray) -> np.ndarray:
 
 
 def _gaps(
-    motion: _Motion, cell: Cell, action: Action, surface: Surface, shift_m: np.ndarray
+    motion: _Motion, cell: Cell, action: Action, surface: TargetMesh, shift_m: np.ndarray
 ) -> np.ndarray:
     """How far (t,) the shifted object's surface is along the tool's axis from the planned tool."""
     moved, turned = step_lengths(motion.positions), step_lengths(motion.axes)
@@ -280,26 +284,32 @@ def _pad_heights(
     """Heights (m,) averaged over a soft round pad's width along the path."""
     there = found < _LOST_M
     touched = positions + np.where(there, found, 0.0)[:, None] * axes
-    offset = touched[None] - positions[:, None]
+    # A part of the path that passes by again later is not under the pad.
+    reach = int(2.0 * radius / _SAMPLE_M)
+    beside = np.arange(len(found))[:, None] + np.arange(-reach, reach + 1)
+    inside = (beside >= 0) & (beside < len(found))
+    beside = np.clip(beside, 0, len(found) - 1)
+    offset = touched[beside] - positions[:, None]
     along = np.einsum("mka,ma->mk", offset, axes)
     aside = np.sqrt(np.maximum(np.einsum("mka,mka->mk", offset, offset) - along**2, 0.0))
-    # A part of the path that passes by again later is not under the pad.
-    order = np.abs(np.subtract.outer(np.arange(len(found)), np.arange(len(found))))
-    near = (order <= 2.0 * radius / _SAMPLE_M) & (aside < radius) & (np.abs(along) < _LOST_M)
-    weight = np.where(near & there, np.sqrt(np.maximum(1.0 - (aside / radius) ** 2, 0.0)), 0.0)
+    near = inside & there[beside] & (aside < radius) & (np.abs(along) < _LOST_M)
+    weight = np.where(near, np.sqrt(np.maximum(1.0 - (aside / radius) ** 2, 0.0)), 0.0)
     total = weight.sum(axis=1)
     mean = (weight * along).sum(axis=1) / np.maximum(total, 1e-9)
     return np.where(total > 0.0, mean, 1.0)
 
 
 def heights(
-    positions: np.ndarray, axes: np.ndarray, surface: Surface, shift_m: np.ndarray
+    positions: np.ndarray, axes: np.ndarray, surface: TargetMesh, shift_m: np.ndarray
 ) -> np.ndarray:
     """How far (m,) along axes (m, 3) from positions (m, 3) the object's surface is, when it is
-    shifted, all in its planned frame; 1 m where there is none."""
-    points, normals, off = surface.nearest(positions - shift_m, -axes)
-    facing = -np.einsum("na,na->n", axes, normals)
-    along = -np.einsum("na,na->n", points + shift_m - positions, normals)
-    found = along / np.maximum(facing, _FLATTEST)
-    lost = ~np.isfinite(off) | (facing < _FLATTEST) | (np.abs(found) > _LOST_M)
-    return np.where(lost, 1.0, found)
+    shifted, all in its planned frame; 1 m where there is none that faces the tool."""
+    found = np.ones(len(positions))
+    for before in _BEFORE_M:
+        lost = np.flatnonzero(found == 1.0)
+        starts = positions[lost] - shift_m - before * axes[lost]
+        distances, faces = surface.first_hits(starts, axes[lost])
+        facing = -np.einsum("na,na->n", axes[lost], surface.face_normals[faces])
+        there = (faces >= 0) & (facing > _FLATTEST) & (distances - before < _LOST_M)
+        found[lost[there]] = distances[there] - before
+    return found

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.sampling import indices_in_subset
+from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.similarity import up_axis
+from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.process.bound_knowledge import BoundKnowledge, read_bound_knowledge
 from nrdf.reports.job_folder import KNOWLEDGE
 from nrdf.robot.model.cell import upright_rotation
-from nrdf.surface.surface import Surface, surface_subset
+from nrdf.robot.simulation.job_surface import JobSurfaces, read_job_surfaces
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.file import FILE, read_toolpaths
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Job, ToolPath
@@ -26,13 +27,15 @@ _FARTHEST_M = 0.05  # that a waypoint may be from the object, beyond the stand-o
 class SimulationJob:
     """A job with the object that it is for.
 
-    bound_knowledge: the job's own knowledge: the target in metres with its regions. strategies:
-    of each of the job's paths. upright: (3, 3), from the target's frame to one with z up and x
+    bound_knowledge: the job's own knowledge: the target in metres with its regions. surfaces: the
+    object as it was given and as it was planned on, and regions. strategies: of each of the job's
+    paths. upright: (3, 3), from the target's frame to one with z up and x
     where the object faces; origin: where that is from, in words; assumed: whether nothing says it.
     """
 
     job: Job
     bound_knowledge: BoundKnowledge
+    surfaces: JobSurfaces
     strategies: tuple[Strategy, ...]
     upright: np.ndarray
     origin: str
@@ -50,19 +53,14 @@ class SimulationJob:
         assert normals is not None  # read_simulation_job lets no other pass
         return normals
 
-    @cached_property
-    def surface(self) -> Surface:
-        """The target's surface, without repeated points, and thinned where there are very many."""
-        return Surface(self.points[self._subset], self.normals[self._subset])
+    def with_mesh(self, file: str | Path) -> SimulationJob:
+        """The same with the mesh of a file, in metres, as the object that the arm meets.
 
-    def region(self, name: str) -> np.ndarray:
-        """A region as indices (k,) of the surface's points."""
-        indices = self.bound_knowledge.regions[name]
-        return indices_in_subset(self._subset, indices, len(self.points))
-
-    @cached_property
-    def _subset(self) -> np.ndarray:
-        return surface_subset(self.points, self.normals)
+        Raises DataError for a file that cannot be read, ProcessError for a mesh that is none.
+        """
+        mesh = TargetMesh.from_mesh(Mesh(*load_mesh(file)))
+        surfaces = self.surfaces.with_mesh(mesh, f"mesh {Path(file).name}")
+        return replace(self, surfaces=surfaces)
 
 
 def read_simulation_job(folder: str | Path, up: str | None = None) -> SimulationJob:
@@ -70,8 +68,9 @@ def read_simulation_job(folder: str | Path, up: str | None = None) -> Simulation
 
     up: an axis of the job's frame ("x" to "-z"), or "x y z", instead of what the job says.
 
-    Raises ProcessError where it is no such folder, where a tool path does not have the strategy
-    that made it, and where tool paths and object do not fit each other: another frame or unit.
+    Raises ProcessError where it is no such folder or has no surface, where a tool path does
+    not have the strategy that made it, and where tool paths and object do not fit each
+    other: another frame or unit.
     """
     folder = Path(folder)
     job = read_toolpaths(folder)
@@ -94,7 +93,11 @@ def read_simulation_job(folder: str | Path, up: str | None = None) -> Simulation
     if bound_knowledge.cloud.normals is None:
         raise ProcessError(f"the job's {bound_knowledge.knowledge.reference.cloud} has no normals")
     strategies = tuple(_strategy(bound_knowledge, path) for path in job.paths)
-    made = SimulationJob(job, bound_knowledge, strategies, *_orientation(job, up))
+    radii: dict[str, float] = {}
+    for path in job.paths:
+        radii[path.region] = min(path.tool_radius_m, radii.get(path.region, np.inf))
+    surfaces = read_job_surfaces(folder, bound_knowledge, radii)
+    made = SimulationJob(job, bound_knowledge, surfaces, strategies, *_orientation(job, up))
     _check_frame(made)
     return made
 
@@ -124,12 +127,12 @@ def _orientation(job: Job, up: str | None) -> tuple[np.ndarray, str, bool]:
 
 def _check_frame(simulation_job: SimulationJob) -> None:
     """Raise ProcessError where the tool paths are not on the object."""
-    surface = simulation_job.surface
+    surface = simulation_job.surfaces.given
     for path, strategy in zip(simulation_job.job.paths, simulation_job.strategies, strict=True):
         positions = [s.positions for s in path.segments if s.kind == "process"]
         if not positions:
             raise ProcessError(f"the tool path on '{path.region}' has no process segment")
-        distance = surface.tree.query(np.concatenate(positions))[0] - strategy.standoff_m
+        distance = surface.nearest(np.concatenate(positions)).distances - strategy.standoff_m
         typical = float(np.median(distance))
         if typical > _FARTHEST_M:
             size = float(np.ptp(simulation_job.points, axis=0).max())

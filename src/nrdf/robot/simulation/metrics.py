@@ -15,9 +15,8 @@ from nrdf.robot.planning.program import PathProgram
 from nrdf.robot.planning.reachability import Reachability
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.execute import ExecutionLog
-from nrdf.surface.surface import Surface
-from nrdf.toolpath.metrics import RegionPoints
-from nrdf.toolpath.region_samples import Coverage
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.region_samples import Coverage, RegionSamples
 from nrdf.toolpath.sampled_path import reached_points
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import SegmentGroup, ToolPath
@@ -42,8 +41,8 @@ class PathMetrics:
     of reached waypoints, of the planned joints, against the axis that they are planned with;
     tilted: waypoints where that is not the tool path's own, by max_tilt_rad at most. planned,
     executed, achieved: coverage of the whole region by the tool path, by the part of it that is
-    executed, and in the simulation. region_points: (k,) the region's points, indices of the job's
-    surface; worked, wanted: (k,) those worked in the simulation, and those that are not left out.
+    executed, and in the simulation. samples: (k,) even points of the region's mesh; worked: (k,)
+    those worked in the simulation.
     force_*: while the tool moves along its lines; None where nothing is pressed. off_plan_99_m: of
     the tool from its line, without the offset along the axis.
     """
@@ -59,9 +58,8 @@ class PathMetrics:
     planned: Coverage
     executed: Coverage
     achieved: Coverage
-    region_points: np.ndarray
+    samples: RegionSamples
     worked: np.ndarray
-    wanted: np.ndarray
     force_commanded_n: float | None
     force_mean_n: float | None
     force_spread_n: float | None
@@ -83,8 +81,7 @@ class PathMetrics:
 
 
 def measure_path(
-    region: np.ndarray,
-    surface: Surface,
+    region: RegionMesh,
     path: ToolPath,
     strategy: Strategy,
     cell: Cell,
@@ -95,19 +92,18 @@ def measure_path(
 ) -> PathMetrics:
     """Metrics of a tool path that was executed.
 
-    region: indices (k,) of the surface's points. covered, reachability: as `plan_joint_paths`
+    region: whose parent is the object's true mesh. covered, reachability: as `plan_joint_paths`
     returns them.
     """
     groups = path.groups
     verdicts = _verdicts(groups, program, covered, reachability)
     distance, angle = _errors(cell, groups, program)
     tilts = _tilts(groups, program)
-    region_points = RegionPoints.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
-    points, normals = surface.points[region_points.points], surface.normals[region_points.points]
+    samples = RegionSamples.of(region, strategy)
     height = strategy.standoff_m
 
     def reached(positions: np.ndarray, axes: np.ndarray) -> np.ndarray:
-        return reached_points(points, normals, positions, axes, path.tool_radius_m)
+        return reached_points(samples.points, samples.normals, positions, axes, path.tool_radius_m)
 
     planned = [(group.process.positions, group.process.axes) for group in groups]
     executed = [
@@ -136,12 +132,11 @@ def measure_path(
         axis_error_rad=angle,
         tilted=int((tilts > _TILTED_RAD).sum()),
         max_tilt_rad=float(tilts.max(initial=0.0)),
-        planned=region_points.coverage(reached(*_sampled(planned, height))),
-        executed=region_points.coverage(reached(*_sampled(executed, height))),
-        achieved=region_points.coverage(worked),
-        region_points=region_points.points,
-        worked=worked & region_points.accessible,
-        wanted=region_points.accessible & region_points.inside_margin,
+        planned=samples.coverage(reached(*_sampled(planned, height))),
+        executed=samples.coverage(reached(*_sampled(executed, height))),
+        achieved=samples.coverage(worked),
+        samples=samples,
+        worked=worked & samples.accessible,
         force_commanded_n=commanded,
         force_mean_n=float(force.mean()) if len(force) else None,
         force_spread_n=float(force.std()) if len(force) else None,

@@ -11,7 +11,11 @@ import numpy as np
 from nrdf.errors import RobotError
 from nrdf.robot.model.arm import Arm
 from nrdf.robot.model.cell import Cell, Placement
-from nrdf.robot.model.signed_distance import SignedDistanceField, distance_field_from_points
+from nrdf.robot.model.signed_distance import (
+    SignedDistanceField,
+    distance_field_from_mesh,
+    distance_field_from_points,
+)
 from nrdf.robot.model.tool import tool_of
 from nrdf.robot.planning.inverse_kinematics import SeedLibrary
 from nrdf.robot.planning.joint_path_planner import plan_joint_paths
@@ -77,16 +81,16 @@ def simulate(
 ) -> SimulationResult:
     """Simulate a job on an arm.
 
-    distance_field: of the object, from its points unless given; placement: searched for unless
+    distance_field: of the object, from its surface unless given; placement: searched for unless
     given, with the turntable at any of `turntable_positions` angles. Raises RobotError where
     nothing can be reached.
     """
     rng = np.random.default_rng(seed)
     clock = _Clock()
-    surface = simulation_job.surface
+    surfaces = simulation_job.surfaces
     progress("shape of the object")
     if distance_field is None:
-        distance_field = distance_field_from_points(simulation_job.points, simulation_job.normals)
+        distance_field = _distance_field(simulation_job)
     clock("shape")
     progress("placement")
     upright, paths = simulation_job.upright, simulation_job.job.paths
@@ -115,11 +119,12 @@ def simulate(
         home = find_home(cell, library) if home is None else home
         progress(f"{where}: simulation")
         done = run(
-            cell, path.region, path.groups, joint_paths, home, library, rng, surface, shift, clock
-        )
-        region = simulation_job.region(path.region)
+            cell, path.region, path.groups, joint_paths, home, library, rng, surfaces.given,
+            surfaces.planned, shift, clock,
+        )  # fmt: skip
+        region = surfaces.regions[path.region]
         metrics = measure_path(
-            region, surface, path, strategy, cell, done.program, covered, reachability, done.logs
+            region, path, strategy, cell, done.program, covered, reachability, done.logs
         )
         clock("metrics")
         simulated.append(
@@ -134,6 +139,15 @@ def simulate(
         simulation_job, arm, distance_field, placement, reachable, tuple(simulated), shift,
         clock.seconds,
     )  # fmt: skip
+
+
+def _distance_field(simulation_job: SimulationJob) -> SignedDistanceField:
+    surfaces = simulation_job.surfaces
+    if surfaces.exact:
+        mesh = surfaces.given
+        return distance_field_from_mesh(mesh.vertices, mesh.faces, surfaces.origin)
+    # A scan's mesh has holes, which its points' winding number closes.
+    return distance_field_from_points(simulation_job.points, simulation_job.normals)
 
 
 class _Clock:

@@ -1,0 +1,43 @@
+"""Meshes with fewer triangles, for a screen: not to plan or to measure on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_LARGER = 1.2  # factor by which cells grow until few enough triangles are left
+
+
+def simplified(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh (v, 3), (f, 3) with at most `most` triangles; as it is where it has no more.
+
+    Vertices in one cell of a grid become the one nearest their mean (Rossignac and Borrel, 1993);
+    triangles within a cell go. No vertex moves by more than a cell's diagonal.
+    """
+    if len(faces) <= most:
+        return vertices, faces
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    cell = float(np.sqrt(2.0 * area / most))
+    while True:
+        kept, left = _clustered(vertices, faces, cell)
+        if len(left) <= most:
+            return kept, left
+        cell *= _LARGER
+
+
+def _clustered(
+    vertices: np.ndarray, faces: np.ndarray, cell: float
+) -> tuple[np.ndarray, np.ndarray]:
+    where = np.floor((vertices - vertices.min(axis=0)) / max(cell, 1e-300)).astype(np.int64)
+    _, group = np.unique(where, axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    count = np.bincount(group)
+    mean = np.stack([np.bincount(group, vertices[:, k]) / count for k in range(3)], axis=1)
+    away = np.linalg.norm(vertices - mean[group], axis=1)
+    order = np.lexsort((away, group))
+    first = order[np.concatenate([[0], np.cumsum(count)[:-1]])]
+    faces = group[faces]
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return vertices[first], faces[np.sort(once)]
