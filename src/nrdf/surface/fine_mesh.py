@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 MOST_FACES = 50_000
 """Faces of a refined mesh, about; larger regions are planned in larger triangles."""
 _ROUNDS, _FLIPS, _FIRST_FLIPS = 24, 3, 12
-_OF_SQUARE = 0.15  # of a square on the longest edge, what a triangle has about
+_OF_SQUARE = 0.11  # of a square on the longest edge, what a triangle has about
 _FLAT = 3e-7  # of the mesh's extent: two triangles that lie so flat are one face, cut anyhow
 
 
@@ -145,29 +145,31 @@ def refine(
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     edge_m = max(edge_m, float(np.sqrt(area / (_OF_SQUARE * most_faces))))
     flat = _FLAT * float(np.ptp(vertices, axis=0).max())
-    finished: list[tuple[np.ndarray, np.ndarray]] = []
-    for number in range(_ROUNDS):
-        # Only faces with a long edge change, and that edge is long for both of its faces.
-        pairs, of_face, long = _long_edges(vertices, faces, edge_m, wanted[origin])
-        busy = long[of_face].any(axis=1)
-        finished.append((faces[~busy], origin[~busy]))
-        faces, origin = faces[busy], origin[busy]
-        for _ in range(_FIRST_FLIPS if number == 0 else 1):
-            faces, changed = _flipped(vertices, faces, flat, wanted[origin])
-            if changed <= 0.01 * len(faces):
-                break
-        if not len(faces):
+    for _ in range(_FIRST_FLIPS):
+        faces, changed = _flipped(vertices, faces, flat, wanted)
+        if changed <= 0.01 * len(faces):
             break
-        pairs, of_face, long = _long_edges(vertices, faces, edge_m, wanted[origin])
-        inner = _Inner.of(vertices, faces, pairs, of_face, flat)
+    finished: list[tuple[np.ndarray, np.ndarray]] = []
+    for _ in range(_ROUNDS):
+        # Only faces with a long edge change, and that edge is long for both of its faces.
+        edges = _Edges.of(faces)
+        pairs, of_face = edges.pairs, edges.of_face
+        long = np.zeros(len(pairs), bool)
+        long[of_face[wanted[origin]]] = True
+        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+        long &= length > edge_m
+        busy = long[of_face].any(axis=1)
+        inner = _Inner.of(vertices, faces, edges, flat)
         long[inner.edge[inner.flat & (inner.height < 0.5 * edge_m)]] = False
         if not long.any():
             break
+        finished.append((faces[~busy], origin[~busy]))
         middle = np.full(len(pairs), -1)
         middle[long] = len(vertices) + np.arange(int(long.sum()))
         vertices = np.concatenate([vertices, vertices[pairs[long]].mean(axis=1)])
-        faces, source = split_edges(faces, middle[of_face], vertices)
-        origin = origin[source]
+        faces, source = split_edges(faces[busy], middle[of_face[busy]], vertices)
+        origin = origin[busy][source]
+        faces, _ = _flipped(vertices, faces, flat, wanted[origin])
     finished.append((faces, origin))
     faces, origin = (np.concatenate(kind) for kind in zip(*finished, strict=True))
     for _ in range(_FLIPS):
@@ -175,17 +177,6 @@ def refine(
         if changed <= 0.01 * len(faces):
             break
     return FineMesh(vertices, faces, origin, edge_m)
-
-
-def _long_edges(
-    vertices: np.ndarray, faces: np.ndarray, edge_m: float, wanted: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (e, 2), those of each face (f, 3), and which are long and of a wanted face."""
-    pairs, of_face = edges_of(faces)
-    long = np.zeros(len(pairs), bool)
-    long[of_face[wanted]] = True
-    length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
-    return pairs, of_face, long & (length > edge_m)
 
 
 def split_edges(
@@ -227,6 +218,35 @@ def split_edges(
 
 
 @dataclass(frozen=True)
+class _Edges:
+    """Edges (e, 2) of two vertices, sorted; those of each face (f, 3), from each corner on; the
+    edges (n,) of just two faces, and their half-edges (n,) in the one and in the other."""
+
+    pairs: np.ndarray
+    of_face: np.ndarray
+    inner: np.ndarray
+    one: np.ndarray
+    other: np.ndarray
+
+    @staticmethod
+    def of(faces: np.ndarray) -> _Edges:
+        tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+        vertices = int(faces.max(initial=0)) + 1
+        key = np.minimum(tail, head).astype(np.int64) * vertices + np.maximum(tail, head)
+        order = np.argsort(key)
+        key = key[order]
+        new = np.ones(len(key), bool)
+        new[1:] = key[1:] != key[:-1]
+        number = np.empty(len(key), np.int64)
+        number[order] = np.cumsum(new) - 1
+        start = np.flatnonzero(new)
+        inner = np.flatnonzero(np.diff(start, append=len(key)) == 2)
+        one, other = order[start[inner]], order[start[inner] + 1]
+        pairs = np.stack(np.divmod(key[start], vertices), axis=1)
+        return _Edges(pairs, number.reshape(-1, 3), inner, one, other)
+
+
+@dataclass(frozen=True)
 class _Inner:
     """Edges (n,) between two faces f, g: a, b on the edge, c, d across; whether they lie flat, and
     the larger height of the two triangles on the edge."""
@@ -238,19 +258,8 @@ class _Inner:
     height: np.ndarray
 
     @staticmethod
-    def of(
-        vertices: np.ndarray,
-        faces: np.ndarray,
-        pairs: np.ndarray,
-        of_face: np.ndarray,
-        limit: float,
-    ) -> _Inner:
-        sides = of_face.ravel()
-        order = np.argsort(sides, kind="stable")
-        count = np.bincount(sides, minlength=len(pairs))
-        first = np.cumsum(count) - count
-        inner = np.flatnonzero(count == 2)
-        one, other = order[first[inner]], order[first[inner] + 1]
+    def of(vertices: np.ndarray, faces: np.ndarray, edges: _Edges, limit: float) -> _Inner:
+        inner, one, other = edges.inner, edges.one, edges.other
         f, g = one // 3, other // 3
         a, b, c = (faces[f, (one + k) % 3] for k in range(3))
         d = faces[g, (other + 2) % 3]
@@ -271,13 +280,23 @@ def _flipped(
 ) -> tuple[np.ndarray, int]:
     """Faces (f, 3) with edges between flat neighbours of one kind (f,) turned where that makes them
     less thin, and how many were: Delaunay's criterion, for edges that share no triangle."""
-    inner = _Inner.of(vertices, faces, *edges_of(faces), flat)
+    edges = _Edges.of(faces)
+    inner = _Inner.of(vertices, faces, edges, flat)
     pa, pb, pc, pd = vertices[inner.corners].transpose(1, 0, 2)
     wide = _angle(pa - pc, pb - pc) + _angle(pa - pd, pb - pd)
     alike = kind[inner.faces[:, 0]] == kind[inner.faces[:, 1]]
     chosen = np.flatnonzero(inner.flat & alike & (wide > np.pi + 1e-6))
     if not len(chosen):
         return faces, 0
+    # An edge that is there already would get more than two faces.
+    count = int(faces.max()) + 1
+    c, d = np.sort(inner.corners[chosen, 2:].astype(np.int64), axis=1).T
+    there = edges.pairs[:, 0] * count + edges.pairs[:, 1]
+    place = np.minimum(np.searchsorted(there, c * count + d), len(there) - 1)
+    _, first = np.unique(c * count + d, return_index=True)
+    new = np.zeros(len(chosen), bool)
+    new[first] = there[place[first]] != (c * count + d)[first]
+    chosen = chosen[new]
     # Each takes its two faces, the widest first.
     f, g = inner.faces[chosen].T
     rank = np.empty(len(chosen), int)
@@ -299,8 +318,6 @@ def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    pairs = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    pairs = np.sort(pairs, axis=1).astype(np.int64)
-    key = pairs[:, 0] * (int(faces.max(initial=0)) + 1) + pairs[:, 1]
-    _, first, of_face = np.unique(key, return_index=True, return_inverse=True)
-    return pairs[first], of_face.reshape(-1, 3)
+    """Edges (e, 2) of two vertices, and the edges (f, 3) of each face, from each corner on."""
+    edges = _Edges.of(faces)
+    return edges.pairs, edges.of_face

@@ -17,16 +17,33 @@ def cut(mesh: FineMesh, level: np.ndarray, values: np.ndarray) -> tuple[FineMesh
     The function may differ between the faces around a vertex. Faces that share an edge still share
     it afterwards. values: (f, 3, k), other functions; returns the mesh and those on it.
     """
-    pairs, of_face = edges_of(mesh.faces)
     there = np.roll(level, -1, axis=1)
     crossing = (level > 0.0) != (there > 0.0)
+    # Only those faces, and their neighbours, have a place on an edge.
+    ends = np.zeros(len(mesh.vertices), bool)
+    ends[mesh.faces[crossing]] = True
+    ends[np.roll(mesh.faces, -1, axis=1)[crossing]] = True
+    near = ends[mesh.faces].sum(axis=1) > 1
+    faces, level, there, crossing = mesh.faces[near], level[near], there[near], crossing[near]
+    pairs, of_face = edges_of(faces)
     share = level / np.where(crossing, level - there, 1.0)
-    share = np.where(mesh.faces == pairs[of_face, 0], share, 1.0 - share)
+    share = np.where(faces == pairs[of_face, 0], share, 1.0 - share)
     # Where the two faces of an edge differ, their mean.
     edge = of_face[crossing]
     count = np.bincount(edge, minlength=len(pairs))
     mean = np.bincount(edge, share[crossing], len(pairs)) / np.maximum(count, 1)
-    return divided(mesh, pairs, of_face, np.where(count > 0, mean, np.nan), values)
+    share = np.where(count > 0, mean, np.nan)
+    part = FineMesh(mesh.vertices, faces, mesh.origin[near], mesh.edge_m)
+    pieces, on_pieces = divided(part, pairs, of_face, share, values[near])
+    if pieces is part:
+        return mesh, values
+    whole = FineMesh(
+        pieces.vertices,
+        np.concatenate([mesh.faces[~near], pieces.faces]),
+        np.concatenate([mesh.origin[~near], pieces.origin]),
+        mesh.edge_m,
+    )
+    return whole, np.concatenate([values[~near], on_pieces])
 
 
 def divided(

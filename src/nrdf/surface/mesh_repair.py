@@ -12,7 +12,7 @@ from nrdf.errors import DataError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.mesh import check_mesh, clean_mesh, outer_skin
 from nrdf.geometry.winding import MeshWindingNumber
-from nrdf.surface.mesh_sewing import paired_half_edges, split_vertices
+from nrdf.surface.mesh_sewing import crowded_edges_divided, paired_half_edges, split_vertices
 from nrdf.surface.mesh_union import united
 
 _VIEWED = 20_000  # points of the skin that say which way its parts look
@@ -69,7 +69,7 @@ def repaired_skin(
         raise DataError("no face of the mesh can be reached from outside")
     if hidden.any():
         repairs.append(_said(int(hidden.sum()), "inside the object", "removed"))
-    faces = faces[~hidden]
+    vertices, faces, _ = crowded_edges_divided(vertices, faces[~hidden])
     used = len(np.unique(faces))
     split, place = split_vertices(faces, paired_half_edges(vertices, faces))
     if len(place) > used:
