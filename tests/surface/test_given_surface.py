@@ -11,6 +11,7 @@ from builders.surfaces import board, dome, two_sided
 from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud, in_metres, read_cloud
 from nrdf.surface.given_surface import MeshSurface, PointSurface, given_surface
+from nrdf.surface.object_mesh import object_mesh
 
 BOX = trimesh.creation.box((1.0, 0.4, 0.6))
 DOWN = np.array([[0.0, 0.0, -1.0]])
@@ -60,12 +61,25 @@ def test_a_mesh_that_native_code_must_not_see_is_none(mesh):
     assert isinstance(given_surface(cloud_of(mesh)), PointSurface)
 
 
-def test_what_is_wrong_with_some_triangles_leaves_the_others():
-    vertices = np.concatenate([BOX.vertices, [[np.nan, 0, 0], [np.inf, 0, 0]]])
-    faces = np.concatenate([BOX.faces, [[0, 1, 8], [0, 0, 1], [0, 1, 99], [-1, 0, 1]], BOX.faces])
-    given = given_surface(cloud_of(Mesh(vertices, faces)))
+def test_repeated_and_empty_triangles_are_no_trouble():
+    faces = np.concatenate([BOX.faces, [[0, 0, 1]], BOX.faces])
+    given = given_surface(cloud_of(Mesh(np.array(BOX.vertices), faces)))
     assert isinstance(given, MeshSurface)
+    assert given.name == "the mesh as given (12 triangles)"
     assert given.distance(np.array([[0.0, 0.0, 0.35]]), DOWN)[0] == pytest.approx(0.05)
+
+
+def test_a_mesh_that_is_known_already_is_not_repaired_again(monkeypatch):
+    cloud = cloud_of(Mesh(np.array(BOX.vertices), np.array(BOX.faces)))
+    known = object_mesh(cloud, 0.03)
+    monkeypatch.setattr("nrdf.surface.target_mesh.repaired_skin", None)
+    assert given_surface(cloud, known).name == "the mesh as given (12 triangles)"
+
+
+def test_the_mesh_made_of_a_cloud_does_not_judge_it():
+    points, normals = dome()
+    cloud = PointCloud(points, normals, "m")
+    assert isinstance(given_surface(cloud, object_mesh(cloud, 0.03)), PointSurface)
 
 
 def test_the_surface_between_points_is_smooth():

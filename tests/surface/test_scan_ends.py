@@ -60,7 +60,7 @@ def test_ends_are_even_and_near_the_last_points():
     normals = np.tile([0.0, 0.0, 1.0], (len(vertices), 1))
     found = even_ends(rough, faces, points, normals, np.full(len(vertices), 2.0))
     end = np.flatnonzero((vertices[:, 0] == 20.0) & (np.abs(vertices[:, 1] - 10.0) < 7.0))
-    np.testing.assert_allclose(found[end, 0], 19.0 + 0.35 * 2.0, atol=0.05)
+    np.testing.assert_allclose(found[end, 0], 19.0 + 0.2 * 2.0, atol=0.05)
     inner = np.flatnonzero((vertices > 0.0).all(axis=1) & (vertices[:, :2] < 20.0).all(axis=1))
     np.testing.assert_array_equal(found[inner], rough[inner])
 

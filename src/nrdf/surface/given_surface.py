@@ -1,11 +1,12 @@
 """The object as the user gave it, which tool paths are compared with: a mesh, or all points.
 
-Paths are planned on a surface that is fitted to some of the object's points. Compared with that
-alone, its own errors would not be seen.
+Paths on a scan are planned on a mesh that is made of its points. Compared with that alone, its own
+errors would not be seen.
 """
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
@@ -14,18 +15,21 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
-from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.quadrics import quadrics
 from nrdf.io.cloud import PointCloud
+from nrdf.surface.target_mesh import TargetMesh
+
+log = logging.getLogger(__name__)
 
 _NEIGHBOURS, _LEAST = 24, 6  # points that the surface between them is fitted to
 _FACING, _ALIKE = 0.2, 0.7  # cosines: to the tool's axis; between normals of one sheet
 _SPACING_BY = 7  # the neighbour whose distance gives the spacing of points
 _GAP = 1.5  # spacings to the next point within which the surface is taken to go on
+_SMALLEST = 1e-9  # longest side of a mesh, m, that distances can be told on
 _CHUNK = 1 << 14
 _ASKED = 500  # points whose spacing stands for that of all
-_LEAST_AREA = 1e-14  # of a face, in squares of the mesh's longest side
 
 
 class GivenSurface(Protocol):
@@ -41,12 +45,21 @@ class GivenSurface(Protocol):
         """Distances (m,), m, of places (m, 3) where a tool with z at axes (m, 3), unit, works."""
 
 
-def given_surface(cloud: PointCloud) -> GivenSurface:
+def given_surface(cloud: PointCloud, mesh: TargetMesh | None = None) -> GivenSurface:
     """The surface of a cloud in metres, with normals: that of the mesh that it was sampled from,
-    else that of all of its points."""
-    usable = None if cloud.mesh is None else _usable(cloud.mesh)
-    if usable is not None:
-        return MeshSurface(*usable)
+    else that of all of its points.
+
+    mesh: the outer skin of the cloud's mesh, where it is known (`nrdf.surface.object_mesh`). It is
+    never one that was made of points: those themselves are what was given.
+    """
+    if cloud.mesh is not None:
+        try:
+            skin = TargetMesh.from_mesh(cloud.mesh) if mesh is None else mesh
+            if skin.size < _SMALLEST:
+                raise ProcessError(f"the mesh measures {skin.size:g} m")
+            return MeshSurface(skin.vertices, skin.faces)
+        except ProcessError as error:
+            log.warning("distances are measured to the object's points: %s", error)
     assert cloud.normals is not None  # the caller's to see to
     return PointSurface(cloud.points, cloud.normals)
 
@@ -58,27 +71,6 @@ def with_normals_of(whole: PointCloud, cloud: PointCloud) -> PointCloud:
         return whole
     nearest = cKDTree(cloud.points).query(whole.points)[1]
     return replace(whole, normals=cloud.normals[nearest])
-
-
-def _usable(mesh: Mesh) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices (v, 3) and faces (f, 3) that native code can take; None where there are none."""
-    vertices = np.asarray(mesh.vertices, np.float64)
-    faces = np.asarray(mesh.faces, np.int64)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
-        return None
-    faces = faces[((faces >= 0) & (faces < len(vertices))).all(axis=1)]
-    faces = faces[np.isfinite(vertices[faces]).all(axis=(1, 2))]
-    if not len(faces):
-        return None
-    used, faces = np.unique(faces, return_inverse=True)
-    vertices, faces = vertices[used], faces.reshape(-1, 3)
-    extent = float(np.ptp(vertices, axis=0).max())
-    if not 1e-9 < extent < 1e9:
-        return None
-    corners = (vertices[faces] - vertices[0]) / extent
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    faces = faces[np.linalg.norm(area, axis=1) > _LEAST_AREA]
-    return (vertices, faces) if len(faces) else None
 
 
 class MeshSurface:

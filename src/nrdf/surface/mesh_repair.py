@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.mesh import check_mesh, clean_mesh, outer_skin
+from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh, outer_skin
 from nrdf.geometry.winding import MeshWindingNumber
 from nrdf.surface.mesh_sewing import crowded_edges_divided, paired_half_edges, split_vertices
 from nrdf.surface.mesh_union import united
@@ -36,6 +36,7 @@ def repaired_skin(
     outside, or many triangles that hardly any other touches.
     """
     vertices, faces = check_mesh(vertices, faces)
+    check_coordinate_range(vertices)
     given = len(faces)
     vertices, faces = clean_mesh(vertices, faces)
     repairs: list[str] = []

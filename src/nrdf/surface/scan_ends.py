@@ -7,8 +7,8 @@ import numpy as np
 from nrdf.surface.mesh_edges import boundary_loops, edge_components, opposite_half_edges
 
 _PAST = 0.9  # spacings from the nearest point: farther parts that touch an end are no surface
-_TRIMMED, _RINGS = 0.7, 3  # the same for faces taken away at the end, and rings of them
-_END = 0.35  # spacings past the last point that the surface ends
+_TRIMMED, _RINGS = 0.6, 3  # the same for faces taken away at the end, and rings of them
+_END = 0.2  # spacings past the last point that the surface ends
 _EVENED = 3  # rounds of averaging along the ends
 _SMALL = 1.5  # squares of a spacing, of folds that make no end
 _AROUND = 5.0  # spacings around a hole that is closed

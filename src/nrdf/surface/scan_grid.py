@@ -34,13 +34,13 @@ def zero_surface(scan: ScanPoints, tree: cKDTree) -> tuple[np.ndarray, np.ndarra
     # An odd fraction: flat sides then miss the corners of cells.
     origin = scan.points.min(axis=0) - (_ROUNDS + 4.371) * scan.cell
     shifted = scan.points + scan.offset[:, None] * scan.normals
-    new = np.unique(np.floor((shifted - origin) / scan.cell).astype(np.int64) @ _CODE)
+    new = _once(np.floor((shifted - origin) / scan.cell).astype(np.int64) @ _CODE)
     cells, corners = np.zeros((2, 0), np.int64)
     distance, far = np.zeros(0), np.zeros(0, bool)
     for _ in range(_ROUNDS):
-        asked = np.setdiff1d((new[:, None] + _CORNERS @ _CODE).reshape(-1), corners)
+        asked = _without(_once(new + (_CORNERS @ _CODE)[:, None]), corners)
         found = _distances(scan, tree, _places(asked, origin, scan.cell))
-        cells, corners = np.concatenate([cells, new]), np.concatenate([corners, asked])
+        cells, corners = np.sort(np.concatenate([cells, new])), np.concatenate([corners, asked])
         order = np.argsort(corners, kind="stable")
         corners = corners[order]
         distance = np.concatenate([distance, found[0]])[order]
@@ -52,7 +52,7 @@ def zero_surface(scan: ScanPoints, tree: cKDTree) -> tuple[np.ndarray, np.ndarra
             crossed = outside[:, shared].any(axis=1) & ~outside[:, shared].all(axis=1)
             crossed &= ~beyond[:, shared].any(axis=1)
             beside.append(new[crossed] + np.array(step) @ _CODE)
-        new = np.setdiff1d(np.concatenate(beside), cells)
+        new = _without(_once(np.concatenate(beside)), cells)
         if not len(new):
             break
     index = np.searchsorted(corners, cells[:, None] + _CORNERS @ _CODE)
@@ -64,6 +64,21 @@ def zero_surface(scan: ScanPoints, tree: cKDTree) -> tuple[np.ndarray, np.ndarra
     chosen = np.ascontiguousarray(index[crossed])
     vertices, faces = igl.marching_cubes(distance, places, chosen, 0.0)[:2]
     return np.asarray(vertices), np.asarray(faces, np.int64)
+
+
+def _once(codes: np.ndarray) -> np.ndarray:
+    """Codes of any shape, ascending, each once."""
+    # np.unique makes a hash table, which is a hundred times slower here.
+    codes = np.sort(codes.reshape(-1))
+    return codes[np.concatenate([[True], codes[1:] != codes[:-1]])] if len(codes) else codes
+
+
+def _without(codes: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Those of ascending codes that are not among ascending known ones."""
+    if not len(known):
+        return codes
+    place = np.minimum(np.searchsorted(known, codes), len(known) - 1)
+    return codes[known[place] != codes]
 
 
 def _places(codes: np.ndarray, origin: np.ndarray, cell: float) -> np.ndarray:

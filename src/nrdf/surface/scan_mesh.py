@@ -96,11 +96,11 @@ def _on_surface(
     scan: ScanPoints, tree: cKDTree, vertices: np.ndarray, outward: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (v, 3) moved onto the surface of their side, to which normals `outward` (v, 3)
-    point; the nearest point (v,) of that side; its distance (v,) along the surface."""
+    point; the nearest point (v,) of that side; its distance (v,), m."""
     count = min(_NEAREST, len(scan.points))
     least = np.maximum(scan.spacing, 0.75 * scan.cell)
     moved, nearest = vertices.copy(), np.empty(len(vertices), np.int64)
-    along = np.empty(len(vertices))
+    distances = np.empty(len(vertices))
 
     def work(part: slice) -> None:
         away, near = tree.query(vertices[part], count)
@@ -116,10 +116,8 @@ def _on_surface(
         direction = unit_vectors((weight[:, None] @ normals)[:, 0])
         moved[part] -= np.clip(rise, -scan.cell, scan.cell)[:, None] * direction
         nearest[part] = closest
-        offset = vertices[part] - scan.points[closest]
-        off = np.einsum("va,va->v", offset, scan.normals[closest])
-        flat = np.sqrt(np.maximum(distance**2 - off**2, 0.0))
-        along[part] = np.where(own.any(axis=1), flat, np.inf)
+        off = np.linalg.norm(moved[part] - scan.points[closest], axis=1)
+        distances[part] = np.where(own.any(axis=1), off, np.inf)
 
     for_parts(work, len(vertices))
-    return moved, nearest, along
+    return moved, nearest, distances

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
-from nrdf.geometry.quadrics import quadrics
+from nrdf.geometry.quadrics import quadric_normals, quadrics
 
 _MOST_POINTS = 300_000  # of a thinned scan: more only cost time and memory
 _THINNED, _FINEST = 0.6, 0.75  # of an edge: cells that points are thinned to; edges of a spacing
@@ -151,14 +151,14 @@ def _fitted(
         offset = offset @ frame.astype(np.float32).transpose(0, 2, 1)
         found = quadrics(offset[..., :2], offset[..., 2:], weight)[:, :, 0]
         enough = ((weight > 0.0).sum(axis=1) >= _LEAST)[:, None]
+        rest = offset[..., 2] - found[:, :1] - (offset[..., :2] @ found[:, 1:3, None])[..., 0]
         height = np.where(enough, np.clip(found[:, :1], -0.5, 0.5) * reach, 0.0)
-        slope = np.where(enough, np.clip(found[:, 1:3], -1.0, 1.0), 0.0)
+        found[:, 1:3] = np.where(enough, np.clip(found[:, 1:3], -1.0, 1.0), 0.0)
         moved[part] += height * outward
-        turned[part] = unit_vectors(outward - np.einsum("na,nab->nb", slope, frame[:, :2]))
+        turned[part] = np.einsum("na,nab->nb", quadric_normals(found), frame)
         same = np.maximum((facing > _ALIKE).sum(axis=1), 1)
         spacing[part] = away[part][:, -1] * np.sqrt(np.pi / same)
-        steep[part] = np.abs(slope).max(axis=1)
-        rest = offset[..., 2] - found[:, :1] - (offset[..., :2] @ found[:, 1:3, None])[..., 0]
+        steep[part] = np.abs(found[:, 1:3]).max(axis=1)
         total = np.maximum(weight.sum(axis=1), 1e-12)
         rough[part] = np.where(enough[:, 0], (weight * np.abs(rest)).sum(axis=1) / total, 1.0)
 
