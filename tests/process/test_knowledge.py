@@ -22,6 +22,7 @@ def test_several_processes_keep_their_order():
     ("change", "message"),
     [
         ({"version": 2}, "k.yaml has version 2, from a newer nrdf; this one reads version 1"),
+        ({"version": 0}, "k.yaml has version 0, which never was a version of this format; change"),
         ({"version": "one"}, "version: "),
         ({"regions": []}, "regions: "),
         ({"regoins": []}, "unknown key 'regoins'; did you mean 'regions'?"),

@@ -54,6 +54,11 @@ def parse_knowledge(text: str, origin: str, as_json: bool = False) -> Knowledge:
             f"{origin} has version {version}, from a newer nrdf; this one reads version {VERSION}: "
             "update nrdf"
         )
+    if isinstance(version, int) and version < VERSION:
+        raise ProcessError(
+            f"{origin} has version {version}, which never was a version of this format; change it "
+            f"to version: {VERSION}"
+        )
     return validated(content, origin)
 
 

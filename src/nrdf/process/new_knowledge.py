@@ -28,34 +28,40 @@ DEFAULTS: Mapping[Kind, Mapping[str, Any]] = {
     "sand": {
         "tool": {"name": "sanding disc", "radius_mm": 25, "clearance_mm": 20},
         "overlap": 0.4, "edge_margin_mm": 10, "lead_deg": 3,
+        "line_order": "zigzag", "lead_in_radius_mm": 15, "lead_out_radius_mm": 15,
         "force_n": 20, "force_tolerance_n": 5, "feed_mm_s": 100, "spindle_rpm": 6000,
     },
     "polish": {
         "tool": {"name": "polishing pad", "radius_mm": 25, "clearance_mm": 20},
         "trajectory": "cross-hatch", "overlap": 0.5, "edge_margin_mm": 5,
+        "line_order": "zigzag", "lead_in_radius_mm": 15, "lead_out_radius_mm": 15,
         "force_n": 10, "force_tolerance_n": 3, "feed_mm_s": 80, "spindle_rpm": 2000,
     },
     "oil": {
         "tool": {"name": "oil pad", "radius_mm": 25, "clearance_mm": 20},
-        "overlap": 0.2, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
+        "overlap": 0.2, "line_order": "zigzag",
+        "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
     },
     "paint": {
         "tool": {"name": "spray gun", "radius_mm": 60},
-        "overlap": 0.5, "standoff_mm": 200, "feed_mm_s": 300,
+        "overlap": 0.5, "line_order": "snake", "run_off_mm": 60,
+        "standoff_mm": 200, "feed_mm_s": 300, "constant_speed": True,
         "approach": {"distance_mm": 50, "feed_mm_s": 300},
         "retract": {"distance_mm": 50, "feed_mm_s": 300},
     },
     "clean": {
         "tool": {"name": "brush", "radius_mm": 30, "clearance_mm": 20},
-        "overlap": 0.3, "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
+        "overlap": 0.3, "line_order": "zigzag",
+        "force_n": 5, "force_tolerance_n": 2, "feed_mm_s": 150,
     },
     "inspect": {
         "tool": {"name": "camera", "radius_mm": 80},
-        "overlap": 0.3, "standoff_mm": 300, "feed_mm_s": 50, "spacing_mm": 40,
+        "overlap": 0.3, "line_order": "snake", "heading": "fixed",
+        "standoff_mm": 300, "feed_mm_s": 50, "spacing_mm": 40,
     },
     "custom": {"name": "what is done", "tool": _PAD, "overlap": 0.3, "feed_mm_s": 100},
 }  # fmt: skip
-"""Default values for each kind of process."""
+"""Default values for each kind of process; docs/guides/teach.md says why."""
 
 
 def new_knowledge(
