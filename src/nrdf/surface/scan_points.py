@@ -71,7 +71,7 @@ def smooth_points(points: np.ndarray, normals: np.ndarray, edge_m: float) -> Sca
     else:
         raise ProcessError(
             "no surface goes through the points of the scan: they are scattered; remove what is "
-            "not of the object (nrdf clean), or scan it with less noise"
+            "not of the object (nrdf align does), or scan it with less noise"
         )
     if (share := float((steep > _STEEP).mean())) > _MOST_STEEP:
         raise ProcessError(
