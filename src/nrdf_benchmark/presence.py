@@ -20,7 +20,7 @@ from nrdf.errors import DataError
 from nrdf.io.atomic import output_errors, write_atomically
 from nrdf.io.files import read_file
 from nrdf.process.transfer_result import MIN_CONFIDENCE
-from nrdf.regions.presence import SURELY_ABSENT, Evidence
+from nrdf.regions.presence import SURELY_ABSENT, Evidence, PresenceRule
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.families import get_family
 from nrdf_benchmark.objects.pairs import ABSENT, THERE, part_iou, state_of
@@ -58,18 +58,6 @@ class Example:
 
 _ROWS = TypeAdapter(list[Example])
 _LARGEST = 1 << 26  # bytes of a file of examples
-
-
-@dataclass(frozen=True)
-class PresenceRule:
-    """Overlap to be expected of evidence: 1 / (1 + exp(-(bias + weights @ evidence)))."""
-
-    bias: float
-    weights: tuple[float, ...]
-
-    def overlap(self, evidence: np.ndarray) -> np.ndarray:
-        """(n,) in [0, 1] for evidence (n, e)."""
-        return np.asarray(1 / (1 + np.exp(-self.bias - evidence @ np.array(self.weights))))
 
 
 def examples_of_objects(

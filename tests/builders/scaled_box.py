@@ -27,9 +27,7 @@ def scaled_reference(model, reference, scale):
     encoded.map_points = lambda at, target: mapped(
         reference.points[at], reference.normals[at], target
     )
-    surface = ReferenceSurface(encoded)
-    surface.mirrored = encoded  # mirror images map in the same way
-    return surface
+    return ReferenceSurface(encoded)
 
 
 def line_on_top(height=0.0, lead=0.0, tilt=0.0, count=12):

@@ -42,7 +42,9 @@ def test_second_model_joins_and_same_name_replaces(stocked, untrained):
 
 
 def test_unknown_model_lists_the_known(stocked):
-    with pytest.raises(ModelError, match=r"no model 'chiar'; known: chair; or give the path"):
+    with pytest.raises(
+        ModelError, match=r"no model 'chiar'; known: chair, registration; or give the path"
+    ):
         find_weights("chiar", stocked)
 
 

@@ -8,7 +8,7 @@ import pytest
 import nrdf
 from builders.scaled_box import SCALE, UP, scaled_reference
 from builders.taught_box import SIZE, cloud, faces
-from nrdf.process.correspondence import Correspondence, ReferenceSurface
+from nrdf.process.correspondence import Correspondence
 
 
 @pytest.fixture(scope="module")
@@ -49,13 +49,3 @@ def test_a_direction_follows_the_surface(correspondence):
         assert np.linalg.norm(there) == pytest.approx(1.0)
     spot = faces(cloud())["top"][:1]
     np.testing.assert_allclose(correspondence.map_direction(spot, 3 * UP), UP)
-
-
-def test_the_mirror_image_is_mapped_too_and_brought_back(model):
-    """An untrained C puts a shape onto itself; so does its mirror image's."""
-    reference = ReferenceSurface(model.set_reference(cloud()))
-    correspondence = Correspondence(reference, model.encode(cloud(seed=1)))
-    points, normals = cloud().points[:50], cloud().normals[:50]
-    mapped = correspondence._mapped(points, normals)
-    np.testing.assert_allclose(correspondence.target.original(mapped.points), points, atol=0.01)
-    np.testing.assert_allclose(mapped.normals, normals, atol=0.05)

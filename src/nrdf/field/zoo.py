@@ -18,6 +18,7 @@ from pydantic import ConfigDict, TypeAdapter
 
 from nrdf.errors import ModelError, OutputError, unknown_name
 from nrdf.field.base import Field
+from nrdf.field.registration import METADATA, REGISTRATION, RegistrationField
 from nrdf.field.weights import load_weights, read_metadata
 from nrdf.io.atomic import write_atomically
 from nrdf.io.file_names import file_name_problem
@@ -99,18 +100,24 @@ def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
         return path / WEIGHTS
     if path.is_file():
         return path
+    if str(name) == REGISTRATION:
+        raise ModelError(f"the model {REGISTRATION} has no weights; name a trained one here")
+    known = [*models, REGISTRATION]
     raise ModelError(
-        f"{unknown_name('model', str(name), list(models))}; or give the path of a weight file "
+        f"{unknown_name('model', str(name), known)}; or give the path of a weight file "
         "(.safetensors) or of a finished training run's folder"
     )
 
 
 def load_field(name: str | Path, zoo: Path = ZOO) -> tuple[Field, dict[str, Any]]:
-    """The field of a zoo name or path, on the CPU in evaluation mode, and its metadata.
+    """The field of a zoo name or path, or the model `registration`, on the CPU in evaluation mode,
+    and its metadata.
 
     The metadata are the weight file's, with `name` and `file` added; `scores` of the zoo's index
     come before those of the file. Raises ModelError (`find_weights`, `load_weights`).
     """
+    if name == REGISTRATION:
+        return RegistrationField(), dict(METADATA)
     path = find_weights(name, zoo)
     loaded, metadata = load_weights(path)
     for entry in list_models(zoo):

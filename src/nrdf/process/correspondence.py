@@ -8,14 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
-from nrdf.geometry.canonical import MIRROR
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.sampling import downsample
-from nrdf.geometry.similarity import Similarity
-from nrdf.io.cloud import PointCloud
-from nrdf.regions.mapping import MappedPoints
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 from nrdf.surface.surface import SAME_SIDE, Surface
@@ -46,12 +41,6 @@ class ReferenceSurface:
         self.surface = surface_of(encoded.encoded_cloud)
 
     @cached_property
-    def mirrored(self) -> EncodedReference:
-        """The reference's mirror image, left for right; its own frame is the canonical one."""
-        model = self.encoded.model
-        return EncodedReference(model, _mirrored(model, self.encoded.encoded_cloud))
-
-    @cached_property
     def anchors(self) -> np.ndarray:
         """Evenly spread working points (a,) whose positions on a target are refined."""
         return downsample(self.encoded.encoded_cloud.points, _ANCHORS, np.random.default_rng(0))
@@ -74,10 +63,9 @@ class ReferenceSurface:
 class Correspondence:
     """The mapping from a reference's surface to a target's, both in metres.
 
-    The inverse descriptor function C is evaluated twice, the second time with both objects mirrored
-    in z, which gives an object of the category as well; the mean is better than either. A smooth,
-    small displacement, as in registration, then brings the whole mapped reference closer to the
-    target, so that edges come to lie on edges.
+    The model maps the reference as exactly as it can (`nrdf.regions.mapping`). A smooth, small
+    displacement, as in registration, then brings the whole mapped reference closer to the target,
+    so that edges come to lie on edges.
     """
 
     def __init__(self, reference: ReferenceSurface, target: EncodedCloud) -> None:
@@ -92,32 +80,14 @@ class Correspondence:
         return self.target.pose.scale / self.reference.encoded.encoded_cloud.pose.scale
 
     @cached_property
-    def _mirrored(self) -> EncodedCloud:
-        return _mirrored(self.reference.encoded.model, self.target)
-
-    def _mapped(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
-        """The mean of where C puts points (m, 3) of the reference and their mirror images."""
-        encoded, reference = self.reference.encoded, self.reference.encoded.encoded_cloud
-        one = encoded.map_surface_points(points, normals, self.target)
-        other = self.reference.mirrored.map_surface_points(
-            MIRROR * reference.canonical(points),
-            MIRROR * reference.canonical_normals(normals),
-            self._mirrored,
-        )
-        return one._replace(
-            points=0.5 * (one.points + MIRROR * other.points),
-            normals=unit_vectors(unit_vectors(one.normals) + MIRROR * unit_vectors(other.normals)),
-            existence=0.5 * (one.existence + other.existence),
-            error=0.5 * (one.error + other.error),
-        )
-
-    @cached_property
     def _registered(self) -> np.ndarray:
         """Displacement (a, 3), canonical, that brings each mapped anchor onto the target."""
         reference, target = self.reference, self.target
         whole, anchors = reference.encoded.encoded_cloud, reference.anchors
-        mapped = self._mapped(
-            whole.original(whole.points[anchors]), whole.original_normals(whole.normals[anchors])
+        mapped = reference.encoded.map_surface_points(
+            whole.original(whole.points[anchors]),
+            whole.original_normals(whole.normals[anchors]),
+            target,
         )
         start, facing = mapped.points, mapped.normals
         at = downsample(target.points, 2 * _ANCHORS, np.random.default_rng(1))
@@ -133,7 +103,7 @@ class Correspondence:
         has a counterpart (m,): the field trusts it, and it lies near the surface.
         """
         target, whole = self.target, self.reference.encoded.encoded_cloud
-        mapped = self._mapped(points, normals)
+        mapped = self.reference.encoded.map_surface_points(points, normals, target)
         features = oriented_features(
             whole.canonical(points), whole.canonical_normals(normals), NORMAL_WEIGHT
         )
@@ -195,12 +165,6 @@ class Correspondence:
 def surface_of(encoded: EncodedCloud) -> Surface:
     """The surface of an encoded cloud, of its working points, in the cloud's own frame and unit."""
     return Surface(encoded.original(encoded.points), encoded.original_normals(encoded.normals))
-
-
-def _mirrored(model: CloudEncoder, encoded: EncodedCloud) -> EncodedCloud:
-    """The mirror image of an encoded cloud, left for right, in the canonical frame."""
-    image = PointCloud(MIRROR * encoded.points, MIRROR * encoded.normals)
-    return model.encode(image, Similarity(np.eye(3), np.zeros(3), 1.0))
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:

@@ -1,26 +1,24 @@
-"""Points of one shape mapped onto another: descriptors θ, and the inverse C that finds them."""
+"""Points of one shape mapped onto another: the interface, whatever maps them."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
-import torch
 
-from nrdf.field.base import Inverse
-from nrdf.field.cloud_encoder import CloudEncoder
+from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.regions.presence import PresenceRule
 
 TRUST_SCALE = 0.2
 """Canonical distance at which trust has fallen to 1/e: between a target point and the mapped
-reference, and for the error that the field expects of its prediction."""
-_CHUNK = 8192  # points described or inverted at a time
+reference, and for the error that is expected of a mapped point."""
 
 
 class MappedPoints(NamedTuple):
     """Reference points mapped onto a target, canonical.
 
     points, normals: (m, 3). existence: (m,) in [0, 1], whether the target has such a point; error:
-    (m,) that the field expects of its prediction; 1 and 0 for a field that does not predict them.
+    (m,) that is to be expected of its place; 1 and 0 where nothing predicts them.
     displacement: (m, 3), how far refinement has moved the points.
     """
 
@@ -44,47 +42,32 @@ class MappedPoints(NamedTuple):
         return MappedPoints(*(values[chosen] for values in self))
 
 
-def describe(
-    model: CloudEncoder, z: torch.Tensor, points: np.ndarray, normals: np.ndarray
-) -> torch.Tensor:
-    """Descriptors (1, m, d_k) of canonical points and normals (m, 3) on the shape of z (1, d_z)."""
-    parts = []
-    with torch.inference_mode():
-        for start in range(0, len(points), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            p, n = model.tensor(points[part])[None], model.tensor(normals[part])[None]
-            parts.append(model.field.describe(z, p, n))
-    return torch.cat(parts, dim=1)
+class SurfaceMapper(Protocol):
+    """Maps the surface of one shape, the source, onto any number of targets, and back.
 
-
-def invert(
-    model: CloudEncoder, z: torch.Tensor, k: torch.Tensor, normals: np.ndarray
-) -> MappedPoints:
-    """The points on the shape of z (1, d_z) that descriptors k (1, m, d_k) belong to: C(z, k).
-
-    normals: (m, 3) of the points that were described, for a field that predicts none. Raises
-    ModelError for a field without an inverse.
+    A trained field (`nrdf.regions.field_mapper`) and a registration
+    (`nrdf.regions.registration_mapper`) do. Points and normals (m, 3) are canonical.
     """
-    parts = []
-    with torch.inference_mode():
-        for start in range(0, k.shape[1], _CHUNK):
-            part = slice(start, start + _CHUNK)
-            parts.append(_to_arrays(model.field.invert(z, k[:, part]), normals[part]))
-    return MappedPoints(*map(np.concatenate, zip(*parts, strict=True)))
 
+    presence_rule: ClassVar[PresenceRule]
+    """How the presence of regions is told from what this predicts."""
 
-def _to_arrays(inverse: Inverse, normals: np.ndarray) -> MappedPoints:
-    """One target's prediction; what the field does not predict: the `normals` (m, 3) that the
-    points had where they were described, certain existence, no error."""
-    count = len(normals)
-    return MappedPoints(
-        inverse.points[0].cpu().numpy(),
-        normals if inverse.normals is None else inverse.normals[0].cpu().numpy(),
-        np.ones(count, np.float32)
-        if inverse.existence is None
-        else inverse.existence[0].sigmoid().cpu().numpy(),
-        np.zeros(count, np.float32)
-        if inverse.log_error is None
-        else inverse.log_error[0].exp().cpu().numpy(),
-        np.zeros((count, 3), np.float32),
-    )
+    def map_working(self, target: EncodedCloud, chosen: np.ndarray | None = None) -> MappedPoints:
+        """The source's working points, or those `chosen` (m,) of them, on a target."""
+        ...
+
+    def map_points(
+        self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud
+    ) -> MappedPoints:
+        """Any points of the source's surface on a target."""
+        ...
+
+    def map_precisely(
+        self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud
+    ) -> MappedPoints:
+        """As `map_points`, as exactly as can be, however long it takes."""
+        ...
+
+    def map_back(self, target: EncodedCloud, chosen: np.ndarray | slice) -> MappedPoints:
+        """A target's working points at `chosen` (m,) on the source."""
+        ...

@@ -37,11 +37,23 @@ class Evidence(NamedTuple):
     returned: float
 
 
-# A logistic regression of the overlap with the true region, 0 where the target lacks it, on parts
+@dataclass(frozen=True)
+class PresenceRule:
+    """Overlap to be expected of evidence: 1 / (1 + exp(-(bias + weights @ evidence)))."""
+
+    bias: float
+    weights: tuple[float, ...]
+
+    def overlap(self, evidence: np.ndarray) -> np.ndarray:
+        """(n,) in [0, 1] for evidence (n, e)."""
+        return np.asarray(1 / (1 + np.exp(-self.bias - evidence @ np.array(self.weights))))
+
+
+# Logistic regressions of the overlap with the true region, 0 where the target lacks it, on parts
 # of labelled real objects and on members of families, whole and in scans of three views: what
 # `nrdf eval presence` prints (docs/evidence/scans.md).
-BIAS = -0.78
-WEIGHTS = Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46)
+FIELD_RULE = PresenceRule(-0.78, Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46))
+REGISTRATION_RULE = PresenceRule(0.0, Evidence(existence=0.0, trust=0.0, size=0.0, returned=0.0))
 SURELY_ABSENT = 0.02
 """Overlap to be expected below which a region is taken to be absent, and comes back empty."""
 
@@ -78,16 +90,20 @@ def evidence_of(existence: np.ndarray, trust: float, size: float, returned: floa
     )
 
 
-def find_presence(evidence: Evidence, distance: np.ndarray, whole_distance: np.ndarray) -> Presence:
-    """Presence of a region on a target.
+def find_presence(
+    evidence: Evidence,
+    distance: np.ndarray,
+    whole_distance: np.ndarray,
+    rule: PresenceRule = FIELD_RULE,
+) -> Presence:
+    """Presence of a region on a target, by the rule of what mapped it.
 
     distance: (m,) of its mapped points from the target's, canonical, in position and weighted
     normal; whole_distance: (n,) of the whole reference's. Where the scan shows less than half of
     what it should, no region is surely absent: what is missing may be hidden.
     """
     observed = _observed(distance)
-    score = BIAS + float(np.dot(WEIGHTS, evidence))
-    overlap = float(1 / (1 + np.exp(-score)))
+    overlap = float(rule.overlap(np.array(evidence)))
     if overlap < SURELY_ABSENT and _observed(whole_distance) >= _SHOWN:
         return Presence(ABSENT, 1 - overlap, overlap, observed, evidence)
     if observed < _LEAST_SEEN:

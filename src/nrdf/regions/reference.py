@@ -14,14 +14,17 @@ import numpy as np
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.field.registration import REGISTRATION
 from nrdf.io.inputs import as_cloud
 from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
-from nrdf.regions.mapping import TRUST_SCALE, MappedPoints, describe, invert
+from nrdf.regions.field_mapper import FieldMapper
+from nrdf.regions.mapping import TRUST_SCALE, MappedPoints, SurfaceMapper
 from nrdf.regions.match import Match
 from nrdf.regions.patches import explained_by, find_patches
 from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
+from nrdf.regions.registration_mapper import RegistrationMapper
 from nrdf.scans.kind_check import KindCheck, check_kind
 from nrdf.scans.pose_scorer import PoseScorer
 
@@ -31,18 +34,25 @@ METHODS = ("mask", "points")
 _MAPPED_BACK = 2048  # of a target's points
 
 
+def surface_mapper(model: CloudEncoder, source: EncodedCloud) -> SurfaceMapper:
+    """What maps the surface of an encoded cloud onto others by a model."""
+    if model.preset == REGISTRATION:
+        return RegistrationMapper(source)
+    return FieldMapper(model, source)
+
+
 class EncodedReference:
-    """A reference, encoded, with its descriptors (paper, eq. 8), for any number of targets.
+    """A reference, encoded, with what maps it (paper, eq. 8), for any number of targets.
 
     Attributes:
         model: what encodes targets.
-        encoded_cloud: the reference as the field sees it.
+        encoded_cloud: the reference as the model sees it.
     """
 
     def __init__(self, model: CloudEncoder, encoded_cloud: EncodedCloud) -> None:
         self.model = model
         self.encoded_cloud = encoded_cloud
-        self._k = describe(model, encoded_cloud.z, encoded_cloud.points, encoded_cloud.normals)
+        self._mapper = surface_mapper(model, encoded_cloud)
 
     def check_kind(self, target: EncodedCloud) -> KindCheck:
         """Whether a target looks like an object of the category, upright and facing forward in the
@@ -124,7 +134,7 @@ class EncodedReference:
         # Refinement pulls what has no counterpart onto the target too: measure from where C put it.
         distance = encoded.distance(surface.points - surface.displacement, surface.normals)
         some = np.random.default_rng(0).permutation(len(encoded.points))[:_MAPPED_BACK]
-        back = self._map_back(encoded, some)
+        back = self._mapper.map_back(encoded, some)
         nearest = self.encoded_cloud.nearest(back.points, back.normals, VOTING_NEIGHBOURS)
         matches = {
             name: self._with_presence(
@@ -141,7 +151,7 @@ class EncodedReference:
     def map_surface(self, target: EncodedCloud, refine: bool = False) -> MappedPoints:
         """Where the reference's working points arrive on a target: C(z_t, k_r)."""
         start = time.perf_counter()
-        mapped = invert(self.model, target.z, self._k, self.encoded_cloud.normals)
+        mapped = self._mapper.map_working(target)
         target.seconds["map"] = time.perf_counter() - start
         if refine:
             start = time.perf_counter()
@@ -163,37 +173,25 @@ class EncodedReference:
         if reference.is_whole:
             if surface is not None:
                 return surface.select(indices)
-            k = self._k[:, indices]
-            return invert(self.model, target.z, k, reference.normals[indices])
+            return self._mapper.map_working(target, indices)
         nearest = reference.nearest_working[indices]
         points = reference.canonical(reference.cloud.points[indices])
         normals = reference.normals[nearest]
         if reference.cloud.normals is not None:
             normals = reference.canonical_normals(reference.cloud.normals[indices])
-        mapped = self._map(points, normals, target)
+        mapped = self._mapper.map_points(points, normals, target)
         return mapped if surface is None else mapped.displaced(surface.displacement[nearest])
 
     def map_surface_points(
         self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud
     ) -> MappedPoints:
-        """Where any points of the reference's surface arrive on a target.
+        """Where any points of the reference's surface arrive on a target, as exactly as can be.
 
         points: (m, 3) in the reference's frame and unit, on its surface; normals: (m, 3) outward.
         """
         points = self.encoded_cloud.canonical(points)
         normals = self.encoded_cloud.canonical_normals(normals)
-        return self._map(points, normals, target)
-
-    def _map(self, points: np.ndarray, normals: np.ndarray, target: EncodedCloud) -> MappedPoints:
-        """Canonical points and normals (m, 3) of the reference on a target."""
-        k = describe(self.model, self.encoded_cloud.z, points, normals)
-        return invert(self.model, target.z, k, normals)
-
-    def _map_back(self, target: EncodedCloud, chosen: np.ndarray | slice) -> MappedPoints:
-        """Working points of a target on the reference: C(z_reference, θ(z_target, x))."""
-        points, normals = target.points[chosen], target.normals[chosen]
-        k = describe(self.model, target.z, points, normals)
-        return invert(self.model, self.encoded_cloud.z, k, normals)
+        return self._mapper.map_precisely(points, normals, target)
 
     def correspondence_features(self, target: EncodedCloud) -> np.ndarray:
         """Features (n, 6) of a target's, or the reference's, working points by which points of
@@ -202,7 +200,7 @@ class EncodedReference:
         They are the points of the reference that C finds for the descriptors, with weighted
         normals. Raises ModelError for a field without C.
         """
-        mapped = self._map_back(target, slice(None))
+        mapped = self._mapper.map_back(target, slice(None))
         return oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
 
     def orient_sheets(
@@ -254,7 +252,7 @@ class EncodedReference:
             float(found.mean() / inside.mean()),
             float(returned.mean()) if returned.size else 0.0,
         )
-        presence = find_presence(evidence, distance[inside], distance)
+        presence = find_presence(evidence, distance[inside], distance, self._mapper.presence_rule)
         return match.with_presence(presence, drop_absent)
 
     def _by_mask(

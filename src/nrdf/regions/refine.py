@@ -34,7 +34,7 @@ class Refiner:
         self._template = RegistrationTemplate(
             points[self._chosen], normals[self._chosen], _SETTINGS
         )
-        self._interpolator = DisplacementInterpolator(points, self._chosen)
+        self._interpolator = DisplacementInterpolator(points[self._chosen], points)
 
     def displacement(
         self,

@@ -116,20 +116,20 @@ class RegistrationTemplate:
 
 
 class DisplacementInterpolator:
-    """Displacements of all points from those of a subset.
+    """Displacements of points (n, 3) from those of a few, `known` (k, 3).
 
-    points: (n, 3); chosen: (k,) indices of the subset. Each point moves like its `_NEIGHBOURS`
-    nearest of the subset, weighted by the inverse square of the distance.
+    Each point moves like its `_NEIGHBOURS` nearest of the known ones, weighted by the inverse
+    square of the distance.
     """
 
-    def __init__(self, points: Array, chosen: Array) -> None:
-        count = min(_NEIGHBOURS, len(chosen))
-        distance, self._nearest = cKDTree(points[chosen]).query(points, range(1, count + 1))
+    def __init__(self, known: Array, points: Array) -> None:
+        count = min(_NEIGHBOURS, len(known))
+        distance, self._nearest = cKDTree(known).query(points, range(1, count + 1))
         weight = 1.0 / (distance + 1e-3) ** 2
         self._weight = weight / weight.sum(axis=1, keepdims=True)
 
     def interpolate(self, displacement: Array) -> Array:
-        """Displacements (n, 3) of all points from those of the subset, (k, 3)."""
+        """Displacements (n, 3) of the points from those of the known ones, (k, 3)."""
         return np.einsum("nk,nka->na", self._weight, displacement[self._nearest])
 
 

@@ -104,7 +104,7 @@ class _Template:
         self.points, self.normals = points, normals
         self.chosen = np.random.default_rng(SEED).permutation(len(points))[:TEMPLATE_POINTS]
         self.registered = RegistrationTemplate(points[self.chosen], normals[self.chosen])
-        self.interpolator = DisplacementInterpolator(points, self.chosen)
+        self.interpolator = DisplacementInterpolator(points[self.chosen], points)
 
     def map_surface(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Where the reference's points arrive on a target (m, 3) with normals: (n, 3)."""
