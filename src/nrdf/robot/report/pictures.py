@@ -19,8 +19,8 @@ from nrdf.robot.model.mujoco_model import mujoco
 from nrdf.robot.simulation.execute import ExecutionLog
 from nrdf.robot.simulation.scene import cell_specification
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
+from nrdf.surface.fine_mesh import refine
 from nrdf.surface.target_mesh import TargetMesh
-from nrdf.toolpath.planners.fine_mesh import refine
 from nrdf.viz.palette import (
     COVERED,
     LEFT_OUT,
