@@ -112,3 +112,18 @@ def test_all_regions_at_once_and_why_one_is_left_out():
     assert meshes.found["left"].area_m2 == pytest.approx(0.5, rel=0.03)
     assert "smaller than the tool's footprint" in meshes.left_out["dot"]
     assert meshes.left_out["none"] == "No point belongs to the region by more than a half."
+
+
+def test_points_that_are_given_many_times_are_one_vote_each():
+    sheet = plate(3)
+    points, normals, left = (np.repeat(a, 9, axis=0) for a in votes_on(sheet, lambda x, y: x < 0.5))
+    assert region_mesh(sheet, points, normals, left, 0.05).area_m2 == pytest.approx(0.5, rel=0.03)
+
+
+def test_regions_that_overlap_share_nothing_and_say_so():
+    sheet = plate(3)
+    points, normals, wide = votes_on(sheet, lambda x, y: np.clip(1.2 - x, 0.0, 1.0))
+    shares = {"wide": wide, "right": (points[:, 0] > 0.5) * 0.8}
+    meshes = region_meshes(sheet, points, normals, shares, {"wide": 0.02, "right": 0.02}).found
+    assert meshes["wide"].area_m2 + meshes["right"].area_m2 <= 1.0 + 1e-9
+    assert "1 overlap given to another region" in " ".join(meshes["wide"].changes)

@@ -74,7 +74,7 @@ def _bodies(
     split, place = split_vertices(faces, opposite)
     count = int(part.max()) + 1
     order = np.argsort(part, kind="stable")
-    if count > _MOST_PARTS:
+    if not 1 < count <= _MOST_PARTS:
         return [], [], order
     solids: list[manifold3d.Manifold] = []
     sheets: list[manifold3d.Manifold] = []

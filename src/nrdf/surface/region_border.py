@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
@@ -25,6 +25,7 @@ _OF_RADIUS = 0.35  # of the tool that heat spreads over, at least
 _EDGE, _OF_TOOL = 1.5, 0.45  # edges of the fine mesh along that way, and tool's radii of an edge
 _MOST_FACES = 100_000
 _CREASE, _ACROSS = 0.6, 0.05  # cosine between its faces; conductance across it for each vertex
+_CROWDED = 0.3  # of the spacing that points have if they lie evenly, at least
 _SIDE = 4.0  # spacings that opposite normals are apart
 _FAR = 2.0  # spacings from the middles of faces, from where a vote says nothing
 _STEEPEST = 30.0  # cotangent: thinner triangles conduct no better
@@ -91,6 +92,9 @@ def cut_at_borders(
     and a part of the tool's radius far. Unless regions may overlap, each place belongs to the
     region with the largest membership there.
     """
+    # Points that are given more than once say nothing of their spacing.
+    even = float(np.sqrt(target.face_areas.sum() / len(votes.points)))
+    votes = replace(votes, spacing=max(votes.spacing, _CROWDED * even))
     reach = max(_SMOOTHING * votes.spacing, _OF_RADIUS * tool_radius_m)
     edge = min(reach / _EDGE, _OF_TOOL * tool_radius_m)
     fine = refine(target.vertices, target.faces, edge, most_faces=_MOST_FACES)
