@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 
 from builders.regions_of_shapes import bend, box, cap, cushion, plate, ring, tube
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.planners.field_lines import parts_of
 from nrdf.toolpath.planners.sheets import ends_of, is_band, is_round_rod, sheets_of, width
 from nrdf.toolpath.strategy import Strategy
@@ -32,6 +34,18 @@ def test_a_cushion_is_cut_by_the_way_that_it_faces():
     assert {np.sign(top.outward[2]), np.sign(other.outward[2])} == {-1.0, 1.0}
     assert min(abs(top.outward[2]), abs(other.outward[2])) > 0.95
     assert all(abs(edge.outward[2]) < 0.5 for edge in edges)
+
+
+def test_faces_without_area_are_no_sheets():
+    region = box()
+    thin = np.array([[0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [0.1, 0.2, 0.4]])
+    mesh = region.mesh
+    vertices = np.concatenate([mesh.vertices, thin])
+    faces = np.concatenate([mesh.faces, [[8, 9, 10]]])
+    whole = TargetMesh(vertices, faces, ())
+    degenerate = RegionMesh.from_faces(whole, np.ones(len(faces), bool))
+    part = parts_of(degenerate, STRATEGY)[0]
+    assert len(sheets_of(degenerate, part, STRATEGY)) == 6
 
 
 def test_rods_and_bands_are_told_apart():

@@ -24,6 +24,7 @@ _CREASE = float(np.cos(np.radians(30.0)))
 """Cosine between what the tool feels on neighbouring triangles: below it, they are two sides."""
 _PER_RADIUS = 3.0  # places along the tool's radius at which its normal is asked for
 _ALIKE = float(np.cos(np.radians(50.0)))  # of a narrow sheet with the one that it is merged into
+_SPECK = 0.01  # of the footprint's area: smaller sheets are none
 _SMALL, _NARROW = 0.5, 0.6  # of the footprint's area; of a stepover
 _FACES = float(np.cos(np.radians(45.0)))  # of a closed sheet: which of it is its top
 _FLAT = float(np.cos(np.radians(20.0)))  # of its top, which stays whole
@@ -52,7 +53,8 @@ def sheets_of(region: RegionMesh, part: Part, strategy: Strategy) -> list[Part]:
     facing = felt_normals(region, mesh, strategy.tool_radius_m)
     joints = _joints(mesh)
     number = _merged(mesh, facing, joints, _between_creases(facing, joints), strategy)
-    for one in np.unique(number):
+    least = _SPECK * np.pi * strategy.tool_radius_m**2
+    for one in np.flatnonzero(np.bincount(number, mesh.areas) > least):
         inside = number == one
         sheet = part.sheet(inside)
         closed = sheet.outward is None
@@ -63,9 +65,10 @@ def sheets_of(region: RegionMesh, part: Part, strategy: Strategy) -> list[Part]:
     number = _merged(mesh, facing, joints, number, strategy)
     areas = np.bincount(number, mesh.areas)
     order = np.argsort(-areas, kind="stable")
-    if (areas > 0.0).sum() == 1:
+    kept = order[areas[order] > least]
+    if len(kept) < 2:
         return [part]
-    return [part.sheet(number == k) for k in order if areas[k] > 0.0]
+    return [part.sheet(number == k) for k in kept]
 
 
 def pieces_of(part: Part, chosen: np.ndarray) -> list[Part]:
