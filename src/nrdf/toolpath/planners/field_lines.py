@@ -20,7 +20,7 @@ from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
 _EDGE, _OPEN = 0.45, 0.3
-_SPECK = 0.5
+SPECK = 0.5
 """Share of the footprint's area that a part must have to get a line."""
 _LEAST_SPACING = 0.9
 _SINGLE = 1.5  # radii: a part so wide is reached from its middle line
@@ -85,10 +85,14 @@ class Part:
 
 def parts_of(region: RegionMesh, strategy: Strategy) -> list[Part]:
     """The parts of a region that are worth a line, the largest first, refined for the stepover."""
-    fine = refine(region.mesh.vertices, region.mesh.faces, _EDGE * strategy.stepover_m)
-    meshes = fine.components()
-    least = _SPECK * np.pi * strategy.tool_radius_m**2
+    meshes = refined(region, strategy).components()
+    least = SPECK * np.pi * strategy.tool_radius_m**2
     return [Part(m) for m in meshes if float(m.areas.sum()) >= least] or [Part(meshes[0])]
+
+
+def refined(region: RegionMesh, strategy: Strategy) -> FineMesh:
+    """A region in triangles that are fine enough for the stepover."""
+    return refine(region.mesh.vertices, region.mesh.faces, _EDGE * strategy.stepover_m)
 
 
 def even_levels(

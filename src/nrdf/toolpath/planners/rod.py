@@ -1,142 +1,347 @@
-"""Rod: few long strokes along a leg or a rail, evenly around its section."""
+"""Rod: few long strokes along a leg or a rail, evenly around its section.
+
+A region is split into rods at its branches and sharp bends (`rod_skeleton`). Each flat side of a
+section has its own strokes, in its middle where it is narrow; a round section has them all around.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
-from nrdf.geometry.polylines import arc_length, interpolate, step_lengths, total_length
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polylines import step_lengths, total_length
+from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.toolpath.planners.distance import distance_from
-from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
-from nrdf.toolpath.planners.level_lines import MeshLine, level_lines
+from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, driven, refined
 from nrdf.toolpath.planners.ordering import snake_order
+from nrdf.toolpath.planners.reach import reached_from_paths
+from nrdf.toolpath.planners.reeb_graph import touching_faces
+from nrdf.toolpath.planners.rod_sections import RodFrame, Section, sections, straightened, untorn
+from nrdf.toolpath.planners.rod_skeleton import split_at_branches
 from nrdf.toolpath.planners.sheet_lines import sheet_lines
+from nrdf.toolpath.planners.sheets import sheets_of
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
-_SLENDER, _WHOLE = 1.2, 0.8
-"""A rod is that many times as long as its section is around, and at that share of its stations one
-section holds most of the surface."""
+_SLENDER, _SLENDER_STRIP, _WHOLE = 1.0, 3.0, 0.7
+"""A rod is that many times as long as its section is around, or as a strip is wide, and its
+sections account for that share of its surface."""
+_LEAST = 8.0  # triangles' edges, squared: a rod has more surface
+_OPEN = 0.4  # of a section: where more is missing, it is a strip with two edges
+_STRAIGHT = 2.0  # thicknesses: sections that differ over less don't lead strokes aside
 _STEP = 2.0  # spacings: a longer step lifts the tool
-_GAP = 0.5  # of the section's length: a section that is open wider is a strip's
-_END = 0.6  # of the usual section's length: sections of the end caps are shorter
+_SHARES = 120  # places around a section at which its sides are told apart
+_CORNER, _NEAR = 0.7, 0.04  # cosine of a turn within twice that share of a section: a corner
+_MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.1, 0.9, 0.15
+"""Stepovers: between strokes of one side, and the narrowest side that has a stroke."""
+_AWAY = 0.4  # stepovers from where a stroke should be: there is no surface
+_PART = 0.8  # of the usual section's length: what is shorter is cut at an end
+_WIDE = 0.5  # tool radii: what is left is wider
+_REST = 0.2  # of a part's area that is in no rod
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A piece of a part that is long and thin. mesh: its triangles; frame: its axis; stations: (s,)
+    along it, m, with the section at each; around_m: the usual length of a section."""
+
+    mesh: FineMesh
+    frame: RodFrame
+    stations: np.ndarray
+    sections: list[Section | None]
+    around_m: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether it closes around itself, but for gaps; else it is a strip."""
+        gaps = [s.gap_m / s.length_m for s in self.sections if s is not None]
+        return float(np.median(gaps)) < _OPEN
+
+
+def is_rod(part: Part, spacing_m: float = 0.01) -> bool:
+    """Whether strokes along it are what anybody would run: long, thin, and closed around itself."""
+    rods, rest = rods_of(part, spacing_m)
+    return bool(rods) and not rest and all(rod.closed for rod in rods)
+
+
+def rods_of(part: Part, spacing_m: float = 0.01) -> tuple[list[Rod], list[Part]]:
+    """A part split at its branches into rods, with a section every `spacing_m`, and what is none.
+
+    All of it is "none" where it is no rod.
+    """
+    touching = touching_faces(part.mesh)
+    axes, number = split_at_branches(part.mesh, touching, _LEAST * part.mesh.edge_m**2)
+    rods, rest = [], number < 0
+    for k, axis in enumerate(axes):
+        piece = part.mesh.part(number == k) if (number == k).any() else None
+        rod = None if piece is None else _rod(piece, axis.points, axis.thickness_m, spacing_m)
+        if rod is None:
+            rest |= number == k
+        else:
+            rods.append(rod)
+    left = [] if not rest.any() else [Part(m) for m in part.mesh.part(rest).components()]
+    return rods, left
 
 
 def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
-    """Strokes from end to end of every rod-like part; other parts get a raster.
+    """Strokes from end to end of every rod; what is no rod, and ends that are large, get a raster.
 
-    The section of a part is cut into as many even shares as stepovers fit around it, at every
-    station along it: strokes follow bends and tapers, closer together where the rod is thinner.
     Raises ProcessError for a margin that leaves nothing.
     """
     found: list[SurfacePath] = []
-    for part in parts_of(region, strategy):
-        strokes = rod_strokes(region, part, strategy)
-        found += strokes or driven(region, part, sheet_lines(region, part, strategy), strategy)
+    for part in _touching_parts(region, strategy):
+        rods, rest = rods_of(part, strategy.spacing_m)
+        strokes = [path for rod in rods for path in _strokes(region, part, rod, strategy)]
+        if strokes:
+            left = ~reached_from_paths(part, strokes, strategy.tool_radius_m)
+            rest = [Part(m) for m in part.mesh.part(left).components()] if left.any() else []
+        found += strokes
+        for piece in rest:
+            if not strokes or _is_wide(piece, strategy.tool_radius_m):
+                lines = _raster(region, piece, strategy)
+                least = strategy.tool_radius_m if found else 0.0
+                found += [path for path in lines if total_length(path.contacts) >= least]
     return checked(found, strategy)
 
 
 def rod_strokes(region: RegionMesh, part: Part, strategy: Strategy) -> list[SurfacePath]:
-    """The strokes of one part in snake order; none where it is no rod."""
-    along = _along(part)
-    length = float(np.ptp(along))
-    count = max(int(np.ceil(length / strategy.spacing_m)), 2)
-    levels = along.min() + length * (np.arange(count) + 0.5) / count
-    stations = _stations(level_lines(part.mesh, along, levels), count)
-    around = np.array([total_length(line.points) for line in stations])
-    gaps = [float(np.linalg.norm(line.points[-1] - line.points[0])) for line in stations]
-    if len(stations) < _WHOLE * count or length < _SLENDER * float(np.median(around)):
+    """The strokes of a part that is rods, and nothing else; none of any other."""
+    rods, rest = rods_of(part, strategy.spacing_m)
+    left = sum(float(piece.mesh.areas.sum()) for piece in rest)
+    if left > _REST * float(part.mesh.areas.sum()):
         return []
-    if np.median(gaps) > _GAP * np.median(around):
-        return []
-    if around.sum() * length / count < _WHOLE * float(part.mesh.areas.sum()):
-        return []  # it has branches
-    full = np.flatnonzero(around > _END * np.median(around))
-    stations = stations[full[0] : full[-1] + 1]
-    number = max(int(np.ceil(float(np.quantile(around, 0.9)) / strategy.stepover_m - 0.1)), 1)
-    places, faces, there = _around(stations, number)
-    faces = part.mesh.origin[faces]
-    if strategy.edge_margin_m > 0.0 and part.border_distance is not None:
-        nearest = part.mesh.vertices[part.mesh.border]
-        away = np.linalg.norm(places[:, :, None] - nearest, axis=-1).min(axis=-1)
-        there &= away > strategy.edge_margin_m
+    return [path for rod in rods for path in _strokes(region, part, rod, strategy)]
+
+
+def _raster(region: RegionMesh, part: Part, strategy: Strategy) -> list[SurfacePath]:
+    """Lines of the sides of what is no rod, without short ones where there are longer ones."""
+    found: list[SurfacePath] = []
+    for sheet in sheets_of(region, part, strategy):
+        if not found or _is_wide(sheet, strategy.tool_radius_m):
+            found += driven(region, sheet, sheet_lines(region, sheet, strategy, found), strategy)
+    long = [path for path in found if total_length(path.contacts) >= strategy.tool_radius_m]
+    return long or found[:1]
+
+
+def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> list[SurfacePath]:
+    """The strokes of one rod in snake order, side by side."""
+    there = [k for k, section in enumerate(rod.sections) if section is not None]
+    usual = [s for s in rod.sections if s is not None]
+    shares, sides = _stroke_shares(rod, usual, strategy)
+    wanted = np.stack([_at_shares(section, shares, rod.closed) for section in usual])
+    thick = rod.around_m / np.pi / strategy.spacing_m  # stations
+    around = np.array([[[s.length_m - s.gap_m]] for s in usual])
+    size = _smooth(around, thick)
+    wanted[around[:, 0, 0] < _PART * size[:, 0, 0]] = np.nan
+    wanted = size * _smooth(wanted / size, _STRAIGHT * thick)
+    places = np.zeros((len(usual), len(shares), 3))
+    faces = np.zeros((len(usual), len(shares)), int)
+    good = np.zeros((len(usual), len(shares)), bool)
+    for s, section in enumerate(usual):
+        places[s], faces[s], away = _on_section(section, wanted[s])
+        good[s] = away < _AWAY * strategy.stepover_m
+    if strategy.edge_margin_m > 0.0 and len(part.mesh.border):
+        nearest = cKDTree(part.mesh.vertices[part.mesh.border])
+        good &= nearest.query(places)[0] > strategy.edge_margin_m
+    origin = rod.mesh.origin[faces]
+    axes = rod.frame.at(rod.stations[there])[1]
     paths, numbers = [], []
-    for k in range(number):
-        good = np.flatnonzero(there[:, k])
-        far = step_lengths(places[good, k]) > _STEP * strategy.spacing_m
-        for run in np.split(good, np.flatnonzero((np.diff(good) > 1) | far) + 1):
+    for k in range(len(shares)):
+        on = np.flatnonzero(good[:, k])
+        far = step_lengths(places[on, k]) > _STEP * strategy.spacing_m
+        far |= np.diff(np.array(there)[on]) > 2
+        for run in np.split(on, np.flatnonzero(far) + 1):
             if len(run) > 1 and total_length(places[run, k]) >= strategy.tool_radius_m:
                 normals = region.mesh.smooth_normals(
-                    places[run, k], faces[run, k], strategy.tool_radius_m
+                    places[run, k], origin[run, k], strategy.tool_radius_m
                 )
+                rows = axes[run]
+                steady = _smooth(np.einsum("sra,sa->sr", rows, normals)[:, None], thick)[:, 0]
+                normals = unit_vectors(np.einsum("sra,sr->sa", rows, steady))
                 paths.append(SurfacePath(places[run, k], normals))
-                numbers.append(k)
+                numbers.append(k + 2 * int(sides[k]))  # strokes of two sides are no neighbours
     return snake_order(paths, numbers, strategy.stepover_m)
 
 
-def _along(part: Part) -> np.ndarray:
-    """A length (v,) along a part, m: the distances from its two ends, each far from its own end,
-    where its level lines run straight around the section."""
-    middle = (part.mesh.vertices - part.centre) @ part.axes[0]
-    away = distance_from(part.mesh, np.array([int(np.argmin(middle))]))
-    thick = float(part.mesh.areas.sum() / away.max()) / np.pi
-    from_last = distance_from(part.mesh, np.flatnonzero(away > away.max() - thick))
-    at_first = from_last > from_last.max() - thick
-    from_first = distance_from(part.mesh, np.flatnonzero(at_first))
-    share = from_first / np.maximum(from_first + from_last, 1e-300)
-    length = float(np.median((from_first + from_last)[(share > 0.3) & (share < 0.7)]))
-    return np.asarray(share * from_first + (1.0 - share) * (length - from_last))
+def _rod(mesh: FineMesh, points: np.ndarray, thickness_m: float, spacing_m: float) -> Rod | None:
+    """The rod about an axis (n, 3); None where it is not slender, or mostly something else."""
+    mesh = untorn(mesh, RodFrame.of(points, thickness_m), thickness_m)
+    frame = straightened(mesh, points, thickness_m)
+    mesh = untorn(mesh, frame, thickness_m)
+    at = frame.station(mesh.vertices)
+    low, high = float(at.min()), float(at.max())
+    length = high - low
+    count = max(int(np.ceil(length / spacing_m)), 2)
+    stations = low + length * (np.arange(count) + 0.5) / count
+    found = sections(mesh, frame, stations)
+    around = np.array([0.0 if s is None else s.length_m - s.gap_m for s in found])
+    usual = float(np.median(around))
+    if usual <= 0.0 or length < _SLENDER * usual:
+        return None
+    if around.sum() * length / count < _WHOLE * float(mesh.areas.sum()):
+        return None
+    rod = Rod(mesh, frame, stations, found, usual)
+    return rod if rod.closed or length >= _SLENDER_STRIP * usual else None
 
 
-def _stations(lines: list[MeshLine], count: int) -> list[MeshLine]:
-    """The section at each station, in order, where one line is most of what is there."""
+def _stroke_shares(
+    rod: Rod, usual: Sequence[Section], strategy: Strategy
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (k,) of a section at which strokes run, and the side (k,) that each is on."""
+    length = float(np.quantile([section.length_m for section in usual], 0.8))
+    if not rod.closed:
+        length = float(np.quantile([s.length_m - s.gap_m for s in usual], 0.8))
+    corners = _corners(rod, usual)
+    if not rod.closed:
+        corners = np.unique(np.concatenate([[0.0], corners, [1.0]]))
+    elif not len(corners):
+        number = max(int(np.ceil(length / strategy.stepover_m / _MOST_APART)), 1)
+        return np.arange(number) / number, np.zeros(number, int)
+    else:
+        corners = np.append(corners, corners[0] + 1.0)
+    shares, sides = [], []
+    for side, (first, last) in enumerate(pairwise(corners)):
+        width = (last - first) * length / strategy.stepover_m
+        if width < _LEAST_SIDE and len(corners) > 2 and length > strategy.stepover_m:
+            continue
+        number = max(int(np.ceil(width / _MOST_APART)), 1)
+        apart = max(width / number, _LEAST_APART) * strategy.stepover_m / length
+        shares.append(0.5 * (first + last) + apart * (np.arange(number) - 0.5 * (number - 1)))
+        sides.append(np.full(number, side))
+    return np.concatenate(shares), np.concatenate(sides)
+
+
+def _corners(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
+    """Shares (c,) of a section at which its normals turn sharply, over most of the rod."""
+    shares = (np.arange(_SHARES) + 0.5) / _SHARES
+    mean = np.zeros((_SHARES, 2))
+    for section in usual:
+        at = _lengths(section, shares, rod.closed)
+        step = np.searchsorted(section.along, at % section.length_m, side="right") - 1
+        step = np.clip(step, 0, len(section.faces) - 1)
+        ahead = np.diff(section.flat, axis=0)[step]
+        normal = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        mean += normal * (section.faces[step] >= 0)[:, None]
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    reach = max(round(_NEAR * _SHARES), 1)
+    if rod.closed:
+        cosine = (np.roll(mean, reach, axis=0) * np.roll(mean, 1 - reach, axis=0)).sum(axis=1)
+    else:
+        cosine = np.ones(_SHARES)
+        cosine[reach : _SHARES - reach + 1] = (
+            mean[: _SHARES - 2 * reach + 1] * mean[2 * reach - 1 :]
+        ).sum(axis=1)
     found = []
-    for level in range(count):
-        here = [line for line in lines if line.level == level]
-        length = [total_length(line.points) for line in here]
-        if here and max(length) > _WHOLE * sum(length):
-            found.append(here[int(np.argmax(length))])
-    return found
+    cosine = cosine.copy()
+    while cosine.min() < _CORNER:
+        # The middle of the plateau in which the corner is seen.
+        k = int(np.argmin(cosine))
+        run = [k]
+        for way in (1, -1):
+            j = k + way
+            while abs(j - k) <= 2 * reach and cosine[j % _SHARES] < cosine[k] + 0.1:
+                run.append(j)
+                j += way
+        middle = 0.5 * (min(run) + max(run))
+        found.append((middle / _SHARES) % 1.0)
+        span = np.arange(min(run) - reach, max(run) + reach + 1) % _SHARES
+        cosine[span] = 1.0
+    return np.sort(np.array(found))
 
 
-def _around(stations: list[MeshLine], number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places (s, k, 3) at even shares of every section, triangles (s, k), and which there are.
-
-    An open section counts as closed by a straight line, on which there are no places.
-    """
-    shape = (len(stations), number)
-    places, faces, there = np.zeros((*shape, 3)), np.zeros(shape, int), np.zeros(shape, bool)
-    start: np.ndarray | None = None
-    travel = np.zeros(3)
-    for s, line in enumerate(stations):
-        points, on = line.points, line.faces
-        if not line.closed:
-            points, on = np.vstack([points, points[:1]]), np.append(on, -1)
-            on[-2] = -1
-        first = 0
-        if start is not None:
-            first = int(np.argmin(np.linalg.norm(points[:-1] - start, axis=1)))
-        points = np.vstack([np.roll(points[:-1], -first, axis=0), points[first : first + 1]])
-        on = np.roll(on[:-1], -first)
-        way = arc_length(points)
-        ahead = interpolate(np.array([0.1 * way[-1]]), way, points)[0] - points[0]
-        if start is not None and ahead @ travel < 0.0:
-            points, on = points[::-1], on[::-1]
-            way = arc_length(points)
-            ahead = interpolate(np.array([0.1 * way[-1]]), way, points)[0] - points[0]
-        offset = 0.0
-        if start is not None:
-            # The start is where the one before is nearest, between points as well.
-            step = _unit(ahead)
-            offset = float((start - points[0]) @ step)
-        at = (offset + way[-1] * np.arange(number) / number) % way[-1]
-        places[s] = interpolate(at, way, points)
-        step_of = np.clip(np.searchsorted(way, at, side="right") - 1, 0, len(way) - 2)
-        faces[s], there[s] = on[step_of], on[step_of] >= 0
-        start, travel = interpolate(np.array([offset % way[-1]]), way, points)[0], ahead
-    return places, np.maximum(faces, 0), there
+def _lengths(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
+    """Arc lengths (k,) of shares of a section. A closed one starts where it passes the frame's
+    right, farthest out; an open one after its widest gap."""
+    if closed:
+        x, y = section.flat[:, 0], section.flat[:, 1]
+        up = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+        start = 0.0
+        if len(up):
+            way = -y[up] / np.maximum(y[up + 1] - y[up], 1e-300)
+            out = x[up] + way * (x[up + 1] - x[up])
+            k = int(np.argmax(out))
+            start = float(
+                section.along[up[k]] + way[k] * (section.along[up[k] + 1] - section.along[up[k]])
+            )
+        return start + shares * section.length_m
+    step = np.diff(section.along)
+    gap = int(np.argmax(np.where(section.faces < 0, step, -1.0)))
+    start = float(section.along[gap + 1])
+    return start + shares * (section.length_m - float(step[gap]))
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
-    """A vector (3,) of length 1, or 0 where it has none."""
-    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-300))
+def _at_shares(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
+    """Places (k, 2) in the frame at shares of a section; NaN in its gaps."""
+    at = _lengths(section, shares, closed) % section.length_m
+    step = np.clip(np.searchsorted(section.along, at, side="right") - 1, 0, len(section.faces) - 1)
+    flat = np.stack([np.interp(at, section.along, section.flat[:, a]) for a in (0, 1)], axis=1)
+    flat[section.faces[step] < 0] = np.nan
+    return flat
+
+
+def _smooth(wanted: np.ndarray, thick: float) -> np.ndarray:
+    """Values (s, k, a) without kinks over `thick` stations; gaps (NaN) are filled along the rod."""
+    count = len(wanted)
+    rows = np.arange(count)
+    filled = wanted.copy()
+    for k in range(wanted.shape[1]):
+        good = np.isfinite(wanted[:, k, 0])
+        for a in range(wanted.shape[2]):
+            if good.any():
+                filled[:, k, a] = np.interp(rows, rows[good], wanted[good, k, a])
+            else:
+                filled[:, k, a] = np.inf
+    size = min(2 * int(max(thick, 2.0)) + 1, 2 * (count // 2) + 1)
+    middle = median_filter(filled, (size, 1, 1), mode="nearest")
+    return np.asarray(
+        gaussian_filter1d(middle, max(0.5 * thick, 1.0), axis=0, mode="nearest", truncate=2.5)
+    )
+
+
+def _on_section(section: Section, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The nearest places (k, 3) of a section to places (k, 2) in the frame, their triangles (k,),
+    and how far they are, m."""
+    on = np.flatnonzero(section.faces >= 0)
+    start, ahead = section.flat[on], section.flat[on + 1] - section.flat[on]
+    square = np.maximum((ahead**2).sum(axis=1), 1e-300)
+    share = np.einsum("kna,na->kn", wanted[:, None] - start[None], ahead) / square
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(wanted[:, None] - (start + share[..., None] * ahead), axis=2)
+    best = away.argmin(axis=1)
+    row = np.arange(len(wanted))
+    one, other = section.points[on[best]], section.points[on[best] + 1]
+    places = one + share[row, best, None] * (other - one)
+    return places, section.faces[on[best]], away[row, best]
+
+
+def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
+    """The parts of a region, largest first; what touches along a seam is one part."""
+    fine = refined(region, strategy)
+    touching = touching_faces(fine)
+    count = len(fine.faces)
+    face = np.concatenate([np.repeat(np.arange(count), 3), touching[:, 0]])
+    joint = np.concatenate([count + fine.faces.ravel(), touching[:, 1]])
+    size = count + len(fine.vertices)
+    net = coo_matrix((np.ones(len(face), bool), (face, joint)), (size, size))
+    number = connected_components(net, directed=False)[1][:count]
+    area = np.bincount(number, fine.areas)
+    least = SPECK * np.pi * strategy.tool_radius_m**2
+    order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0.0]
+    chosen = [k for k in order if area[k] >= least] or order[:1]
+    return [Part(fine.part(number == k)) for k in chosen]
+
+
+def _is_wide(part: Part, radius_m: float) -> bool:
+    """Whether a part that was left is worth a line of its own."""
+    area = float(part.mesh.areas.sum())
+    extent = float(np.ptp(part.mesh.vertices @ part.axes[0]))
+    return area >= SPECK * np.pi * radius_m**2 and area >= _WIDE * radius_m * extent
