@@ -10,18 +10,13 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate, step_lengths
+from nrdf.geometry.polylines import step_lengths
 from nrdf.surface.given_surface import MeshSurface
-from nrdf.toolpath.frames import travel_directions
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
+from nrdf_benchmark.mesh_paths.line_spacing import ALIKE, Line, line_spacing
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, face_components
 
-_ALIKE = 0.5  # cosine between normals of one side
-_PARALLEL = 0.8  # cosine between the travel of neighbouring lines
-_BESIDE, _SAME = 2.2, 0.2  # stepovers: the farthest neighbour, and the nearest that is another line
-_PARTS = 8  # samples a tool radius
 _LEAST_STEP_M = 1e-4  # that a turn is divided by
 _FITS = 0.8  # share of a disc that lies on a region which the footprint fits into
 _ASKED = 400  # points at which a region is asked for room
@@ -77,14 +72,15 @@ def measure_mesh_path(
     steps = [step_lengths(line) for line in contacts]
     every_step = np.concatenate([*steps, np.zeros(1)])
     turns = [_turns(a) / np.maximum(s, _LEAST_STEP_M) for a, s in zip(axes, steps, strict=True)]
-    lines = [_Line.of(c, a, strategy) for c, a in zip(contacts, axes, strict=True)]
+    lines = [Line.of(c, a, strategy) for c, a in zip(contacts, axes, strict=True)]
     indices = target.indices(region)
     points, normals = target.skin.points[indices], target.skin.normals[indices]
     covered = [_covered(points, normals, line, strategy.tool_radius_m) for line in lines]
     lengths = np.array([float(step.sum()) for step in steps])
     short = lengths < strategy.tool_radius_m
     shares = np.array([len(one) for one in covered]) / len(points)
-    apart = _line_spacing(lines, strategy.stepover_m) / strategy.stepover_m
+    apart = line_spacing(lines, strategy.stepover_m, points, normals, target.point_area_m2)
+    apart = apart / strategy.stepover_m
     return MeshPathMetrics(
         distance_99_m=float(np.quantile(distance, 0.99)),
         distance_worst_m=float(distance.max()),
@@ -105,24 +101,6 @@ def measure_mesh_path(
     )
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A stroke at even steps: points, outward normals and travel (n, 3), and arc length (n,), m."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    travel: np.ndarray
-    along: np.ndarray
-
-    @classmethod
-    def of(cls, contacts: np.ndarray, axes: np.ndarray, strategy: Strategy) -> _Line:
-        along = arc_length(contacts)
-        at = even_arc_lengths(float(along[-1]), strategy.tool_radius_m / _PARTS)
-        points = interpolate(at, along, contacts)
-        normals = -unit_vectors(interpolate(at, along, axes))
-        return cls(points, normals, travel_directions(points), at)
-
-
 def footprint_fits(target: MeshTarget, region: str, radius_m: float) -> bool:
     """Whether a disc of that radius lies on the region somewhere, for the most part."""
     indices = target.indices(region)
@@ -132,50 +110,18 @@ def footprint_fits(target: MeshTarget, region: str, radius_m: float) -> bool:
     for k, near in zip(
         asked, cKDTree(points).query_ball_point(points[asked], radius_m), strict=True
     ):
-        if (normals[near] @ normals[k] > _ALIKE).sum() >= wanted:
+        if (normals[near] @ normals[k] > ALIKE).sum() >= wanted:
             return True
     return False
 
 
-def _covered(points: np.ndarray, normals: np.ndarray, line: _Line, radius_m: float) -> np.ndarray:
+def _covered(points: np.ndarray, normals: np.ndarray, line: Line, radius_m: float) -> np.ndarray:
     """Which of points (n, 3) a stroke's footprint passes over: indices (k,)."""
     away, near = cKDTree(line.points).query(points, 12, distance_upper_bound=radius_m)
     there = np.isfinite(away)
     facing = line.normals[np.where(there, near, 0)]
-    alike = np.einsum("nka,na->nk", facing, normals) > _ALIKE
+    alike = np.einsum("nka,na->nk", facing, normals) > ALIKE
     return np.flatnonzero((there & alike).any(axis=1))
-
-
-def _line_spacing(lines: Sequence[_Line], stepover_m: float) -> np.ndarray:
-    """Distances (m,), m, along the surface to the next line on each side that has one.
-
-    A chord's arc is told from the normals at its ends. Lines that cross do not count.
-    """
-    points = np.concatenate([line.points for line in lines])
-    normals = np.concatenate([line.normals for line in lines])
-    travel = np.concatenate([line.travel for line in lines])
-    along = np.concatenate([line.along for line in lines])
-    number = np.repeat(np.arange(len(lines)), [len(line.points) for line in lines])
-    tree = cKDTree(points)
-    asked = np.arange(0, len(points), 2)
-    half = 0.75 * max(float(np.median(step_lengths(lines[0].points))), 1e-9)
-    found: list[float] = []
-    for i, near in zip(
-        asked, tree.query_ball_point(points[asked], _BESIDE * stepover_m), strict=True
-    ):
-        k = np.array(near)
-        offset = points[k] - points[i]
-        cosine = normals[k] @ normals[i]
-        own = (number[k] == number[i]) & (np.abs(along[k] - along[i]) < 2.0 * stepover_m)
-        level = np.abs(offset @ travel[i]) < half
-        chosen = ~own & level & (cosine > _ALIKE) & (np.abs(travel[k] @ travel[i]) > _PARALLEL)
-        bend = np.arccos(np.clip(cosine, -1.0, 1.0))
-        length = np.linalg.norm(offset, axis=1) / np.maximum(np.sinc(bend / (2.0 * np.pi)), 0.1)
-        side = offset @ np.cross(normals[i], travel[i])
-        for beside in (side > _SAME * stepover_m, side < -_SAME * stepover_m):
-            if (chosen & beside).any():
-                found.append(float(length[chosen & beside].min()))
-    return np.array(found)
 
 
 def _extents(target: MeshTarget, region: str, contacts: Sequence[np.ndarray]) -> np.ndarray:
