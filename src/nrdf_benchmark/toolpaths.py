@@ -1,13 +1,13 @@
 """Tool paths planned on known regions: families' own, and the benchmark's as labelled.
 
-Clouds are scaled to `SIZE_M` on their longest side. Only planning is measured: no region is
-retrieved.
+Planned as `nrdf transfer` does: a mesh is made of the cloud, and the regions' points vote. Clouds
+are scaled to `SIZE_M` on their longest side. No region is retrieved.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,14 +17,16 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
-from nrdf.geometry.sampling import indices_in_subset
+from nrdf.geometry.frames import angles_between
+from nrdf.io.cloud import PointCloud
 from nrdf.shapes.families import get_family
 from nrdf.shapes.families.member import Member
-from nrdf.surface.border import OWN
-from nrdf.surface.patch import Patch, patches_of
-from nrdf.surface.surface import Surface, surface_subset
+from nrdf.surface.given_surface import given_surface
+from nrdf.surface.object_mesh import object_mesh
+from nrdf.surface.region_mesh import RegionMesh, region_meshes
+from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
-from nrdf.toolpath.planner import plan
+from nrdf.toolpath.region_samples import border_distance, sample_evenly
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 from nrdf_benchmark.bsrc.dataset import read_bsrc
@@ -57,13 +59,14 @@ class PathResult:
     """One region's tool path. width_m: diameter of the largest disc inside the region; bend_rad:
     angle between a point's normal and the smooth one that the tool feels, the 95th percentile;
     near: share of the process waypoints within `NEAR_M` of the exact surface, None where that is
-    not known; seconds: CPU time."""
+    not known; metrics: None where the region is smaller than the tool and has no path; seconds: CPU
+    time."""
 
     object: str
     region: str
     width_m: float
     bend_rad: float
-    metrics: ToolPathMetrics
+    metrics: ToolPathMetrics | None
     near: float | None
     seconds: float
 
@@ -115,17 +118,25 @@ def evaluate_toolpaths(
     results = []
     for number, item in enumerate(objects):
         start = time.process_time()
-        kept = surface_subset(item.points, item.normals)
-        surface = Surface(item.points[kept], item.normals[kept])
-        surface.edges  # noqa: B018, what regions share
-        shared = (time.process_time() - start) / len(item.regions)
+        cloud = PointCloud(item.points, item.normals, unit="m")
+        mesh = object_mesh(cloud, strategy.tool_radius_m)
+        memberships = {name: np.zeros(len(item.points)) for name in item.regions}
         for name, indices in item.regions.items():
-            region = indices_in_subset(kept, indices, len(item.points))
+            memberships[name][indices] = 1.0
+        radii = dict.fromkeys(memberships, strategy.tool_radius_m)
+        meshes = region_meshes(mesh, item.points, item.normals, memberships, radii)
+        given = given_surface(cloud)
+        shared = (time.process_time() - start) / len(item.regions)
+        for name in item.regions:
+            if name not in meshes.found:
+                results.append(PathResult(item.name, name, 0.0, 0.0, None, None, shared))
+                continue
+            region = meshes.found[name]
             start = time.process_time()
-            segments = plan(surface, region, strategy)
+            segments = plan_on_mesh(region, strategy)
             seconds = shared + time.process_time() - start
-            metrics = measure_path(surface, region, strategy, segments)
-            width, bend = _shape(patches_of(surface, region))
+            metrics = measure_path(region, strategy, segments, given)
+            width, bend = _shape(region, strategy)
             near = None if item.exact is None else _near(item.exact, segments, strategy)
             results.append(PathResult(item.name, name, width, bend, metrics, near, seconds))
         if progress is not None:
@@ -133,15 +144,13 @@ def evaluate_toolpaths(
     return results
 
 
-def _shape(patches: Sequence[Patch]) -> tuple[float, float]:
-    """`width_m` and `bend_rad` of a region."""
-    cosines = []
-    for patch in patches:
-        own = patch.label == OWN
-        smooth = patch.smooth_normals(patch.uv[own], STRATEGY.tool_radius_m)
-        cosines.append(np.einsum("na,na->n", smooth, patch.normals[own]))
-    bend = float(np.arccos(np.clip(np.quantile(np.concatenate(cosines), 0.05), -1.0, 1.0)))
-    return 2.0 * max(patch.border.deepest for patch in patches), bend
+def _shape(region: RegionMesh, strategy: Strategy) -> tuple[float, float]:
+    """`width_m` and `bend_rad` of a region; a part without a border is infinitely wide."""
+    mesh, radius = region.mesh, strategy.tool_radius_m
+    points, faces = sample_evenly(mesh, radius / 4.0)
+    smooth = mesh.smooth_normals(points, faces, radius)
+    bend = float(np.quantile(angles_between(smooth, mesh.face_normals[faces]), 0.95))
+    return 2.0 * float(border_distance(mesh, points, mesh.face_normals[faces], radius).max()), bend
 
 
 def _near(exact: Exact, segments: Iterable[Segment], strategy: Strategy) -> float:
@@ -170,35 +179,40 @@ class PathMetric:
 
 def summarize(results: list[PathResult], strategy: Strategy = STRATEGY) -> list[PathMetric]:
     """The metrics that tool paths are held to, of those results that have them."""
+    figures = [result.metrics for result in results if result.metrics is not None]
     made = [
         _metric(
+            "regions with a tool path, %", ">= 100",
+            [100.0 * (result.metrics is not None) for result in results], 100.0, True,
+        ),
+        _metric(
             "coverage of what is not left out, %", ">= 99",
-            [_covered(r.metrics) for r in results], 99.0, True,
+            [_covered(m) for m in figures], 99.0, True,
         ),
         _metric(
             "worst line spacing, stepovers", "<= 1.15",
             [
-                r.metrics.line_spacing_worst_m / strategy.stepover_m
-                for r in results
-                if r.metrics.line_spacing_worst_m is not None
+                m.line_spacing_worst_m / strategy.stepover_m
+                for m in figures
+                if m.line_spacing_worst_m is not None
             ],
             1.15,
         ),
         _metric(
-            "distance from smooth surface (99 %), mm", "<= 1",
-            [1e3 * r.metrics.surface_distance_99_m for r in results], 1.0,
+            "distance from the cloud's surface (99 %), mm", "<= 1",
+            [1e3 * (m.true_distance_99_m or 0.0) for m in figures], 1.0,
         ),
         _metric(
             "tool axis (99 %), degrees", "<= 5",
-            [float(np.degrees(r.metrics.axis_error_99_rad)) for r in results], 5.0,
+            [float(np.degrees(m.axis_error_99_rad)) for m in figures], 5.0,
         ),
         _metric(
             "largest step between waypoints, spacings", "<= 2",
-            [r.metrics.step_worst_m / strategy.spacing_m for r in results], 2.0,
+            [m.step_worst_m / strategy.spacing_m for m in figures], 2.0,
         ),
         _metric(
             "largest turn between waypoints, degrees", "<= 30",
-            [float(np.degrees(r.metrics.turn_worst_rad)) for r in results], 30.0,
+            [float(np.degrees(m.turn_worst_rad)) for m in figures], 30.0,
         ),
     ]  # fmt: skip
     near = [100.0 * r.near for r in results if r.near is not None]

@@ -31,17 +31,6 @@ def two_sided(thickness: float = 0.004) -> tuple[np.ndarray, np.ndarray]:
     return np.r_[top, bottom - [0.0, 0.0, thickness]], np.r_[up, -up]
 
 
-def tube(
-    radius: float = 0.1, length: float = 0.3, turn: float = 2 * np.pi, seed: int = 0
-) -> tuple[np.ndarray, np.ndarray]:
-    """The outside of a cylinder along z, from -turn / 2 to turn / 2 around +x."""
-    rng = np.random.default_rng(seed)
-    count = int(radius * turn * length / SPACING**2)
-    angle = rng.uniform(-turn / 2, turn / 2, count)
-    normals = np.c_[np.cos(angle), np.sin(angle), np.zeros(count)]
-    return radius * normals + np.c_[np.zeros((count, 2)), rng.uniform(0, length, count)], normals
-
-
 def dome(
     radius: float = 0.25, opening: float = 1.0, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import trimesh
 
 from builders.solids import box
+from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.knowledge import Knowledge
@@ -25,6 +29,13 @@ SAND = {
 def cloud(size=SIZE, count=POINTS, seed=0):
     points, normals = box(size, count, seed)
     return PointCloud(points, normals, unit="m")
+
+
+def solid(size=SIZE, count=POINTS, seed=0):
+    """The same, of a box whose mesh is known."""
+    box_mesh = trimesh.creation.box(size)
+    mesh = Mesh(np.array(box_mesh.vertices), np.array(box_mesh.faces))
+    return replace(cloud(size, count, seed), mesh=mesh)
 
 
 def faces(of):

@@ -33,7 +33,7 @@ def test_the_figures_of_a_flat_board_meet_every_bar():
     assert result.wide and result.width_m == pytest.approx(0.3, abs=0.02)
     assert result.near == 1.0 and result.bend_rad < 1e-6
     shown = {metric.name: metric for metric in summarize(results)}
-    assert len(shown) == 7
+    assert len(shown) == 8
     assert all(metric.met.all() for metric in shown.values())
     assert shown["coverage of what is not left out, %"].worst == pytest.approx(100.0, abs=1.0)
 
@@ -41,7 +41,7 @@ def test_the_figures_of_a_flat_board_meet_every_bar():
 def test_what_misses_a_bar_is_counted():
     wide = replace(STRATEGY, stepover_m=0.11)  # twice as far apart as the pad is wide
     results = evaluate_toolpaths([flat(), flat()], wide)
-    coverage = summarize(results, wide)[0]
+    coverage = summarize(results, wide)[1]
     assert not coverage.met.any()
     assert coverage.worst == pytest.approx(50.0, abs=10.0)
 

@@ -10,7 +10,8 @@ import nrdf
 from builders.scaled_box import SCALE, UP, line_on_top, scaled_reference
 from builders.taught_box import SIZE, cloud
 from nrdf.process.correspondence import Correspondence
-from nrdf.process.warp import warp_segments
+from nrdf.process.warp import surface_under, warp_segments
+from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import tool_quaternions
 from nrdf.toolpath.types import Segment
 
@@ -104,3 +105,14 @@ def test_a_line_is_cut_where_the_surface_is_torn(model):
 
 def test_nothing_is_warped_from_nothing(correspondence):
     assert warp_segments(correspondence, [], 0.025) == ((), 0)
+
+
+def test_the_surface_next_to_a_square_corner_is_on_the_tools_side():
+    box = cloud()
+    surface = Surface(box.points, box.normals)
+    x = np.linspace(-0.2, 0.2, 21)
+    points = np.c_[x, np.full(21, SIZE[1] / 2), np.full(21, SIZE[2] / 2 - 1e-3)]
+    upright = np.tile([0.0, 1.0, 1e-17], (21, 1))  # what rounding leaves of a right angle
+    under, normals = surface_under(surface, points, upright)
+    np.testing.assert_allclose(normals, np.tile([0.0, 1.0, 0.0], (21, 1)), atol=1e-6)
+    np.testing.assert_allclose(under, points, atol=1e-6)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import nrdf
-from builders.taught_box import SAND, bound_knowledge, cloud, made_up
+from builders.taught_box import SAND, bound_knowledge, cloud, made_up, solid
 from nrdf.errors import OutputError
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.io.cloud import read_cloud
@@ -31,7 +31,7 @@ PAINT = {
 def transferred(untrained):
     processes = {"top": [SAND, {**SAND, "kind": "oil", "transfer": "warp"}], "right": [PAINT]}
     teacher = ProcessTransfer(bound_knowledge(processes), nrdf.load_model(untrained))
-    return teacher.transfer(cloud(seed=1))
+    return teacher.transfer(solid(seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +46,9 @@ def test_every_file_is_there_and_listed(folder):
     found = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     assert found == sorted(json.loads((folder / "report.json").read_text())["files"])
     assert found == [
-        "knowledge.yaml", "picture.png", "regions/right.ply", "regions/top.ply", "report.html",
-        "report.json", "target.ply", "toolpaths.json",
+        "knowledge.yaml", "picture.png", "region_meshes/right.ply", "region_meshes/top.ply",
+        "regions/right.ply", "regions/top.ply", "report.html", "report.json", "surface.ply",
+        "target.ply", "toolpaths.json",
     ]  # fmt: skip
 
 
@@ -136,18 +137,19 @@ def test_the_html_report_needs_no_network_and_escapes_what_it_shows(folder):
 
 def test_lines_are_drawn_on_the_surface_also_of_tools_above_it(transferred):
     panel = panel_of(transferred, "title")
-    assert set(panel.regions) == set(panel.lines) == {"top", "right"}
+    assert set(panel.region_meshes) == set(panel.lines) == {"top", "right"}
     sides = np.concatenate(panel.lines["right"])
-    np.testing.assert_allclose(sides[:, 2], transferred.target.points[:, 2].max(), atol=2e-3)
-    assert len(panel.lines["top"]) >= 2 * 10
+    np.testing.assert_allclose(sides[:, 2], transferred.target.points[:, 2].max(), atol=1e-9)
+    assert sum(len(line) for line in panel.lines["top"]) > 2 * 0.5 * 0.9 / (0.04 * 0.02) / 1.5
 
 
 def test_the_picture_stands_upright_whatever_the_targets_frame(transferred):
     turn = upright(up_axis("z"))
     lying = replace(transferred, pose=Similarity(turn, np.zeros(3), 1.0))
     straight, panel = panel_of(transferred, "title"), panel_of(lying, "title")
-    np.testing.assert_allclose(panel.points, straight.points @ turn)
-    np.testing.assert_allclose(panel.normals, straight.normals @ turn)
+    np.testing.assert_allclose(panel.mesh.vertices, straight.mesh.vertices @ turn)
+    for name, region in panel.region_meshes.items():
+        np.testing.assert_allclose(region.vertices, straight.region_meshes[name].vertices @ turn)
     np.testing.assert_allclose(panel.lines["top"][0], straight.lines["top"][0] @ turn)
 
 

@@ -64,7 +64,7 @@ def test_figures_are_shown_as_people_read_them():
         "line spacing, mean · worst": "40.0 · 42.0 mm",
         "largest step · turn · turn by mm": "21.0 mm · 1° · 0.1°/mm",
         "off the object, 95 % · worst": "0.6 · 1.2 mm",
-        "off the planned surface, 99 % · worst": "0.4 · 0.9 mm",
+        "off the mesh planned on, 99 % · worst": "0.4 · 0.9 mm",
         "axis off, 99 %": "0.6°",
         "length": "4.00 m",
         "time": "50 s",

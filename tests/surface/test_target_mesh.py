@@ -1,5 +1,7 @@
 """The mesh that paths are planned on: its skin, nearest places of a side, smooth normals."""
 
+import pickle
+
 import numpy as np
 import pytest
 import trimesh
@@ -79,3 +81,11 @@ def test_smooth_normals_are_finite_beside_a_face_without_area():
     mesh = TargetMesh(vertices, np.array([(0, 1, 2), (3, 4, 5)]))
     normals = mesh.smooth_normals(np.array([[0.3, 0.3, 0.0]]), np.array([0]), 0.2)
     assert np.allclose(normals, [[0.0, 0.0, 1.0]])
+
+
+def test_a_mesh_goes_to_another_process_without_its_trees():
+    box = target(trimesh.creation.box())
+    asked = np.array([[0.0, 0.0, 2.0]])
+    before = box.nearest(asked)
+    after = pickle.loads(pickle.dumps(box)).nearest(asked)
+    np.testing.assert_array_equal(before.points, after.points)

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from builders.surfaces import board, tube, two_sided
+from builders.regions_of_shapes import plate, sheet
 from nrdf.errors import ProcessError
 from nrdf.surface.given_surface import MeshSurface
-from nrdf.surface.surface import Surface
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.metrics import measure_path
-from nrdf.toolpath.planner import add_approach_retract
 from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.tool_segments import add_approach_retract
 from nrdf.toolpath.types import Segment
 
 STRATEGY = Strategy(stepover_m=0.04, spacing_m=0.01, tool_radius_m=0.025, feed_m_s=0.1)
-SURFACE = Surface(*board(spacing=0.008))
-REGION = np.arange(len(SURFACE.points))
+BOARD = plate(0.4, 0.3)
 DOWN = Rotation.from_euler("x", np.pi)
 
 
@@ -36,23 +36,23 @@ def lines(*levels: float, x=(0.0, 0.4), z: float = 0.0, turn: Rotation = DOWN, s
 
 
 def test_coverage_is_the_share_of_the_area_within_the_tool_radius():
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2))
+    found = measure_path(BOARD, STRATEGY, lines(0.1, 0.2))
     assert found.coverage == pytest.approx(0.1 / 0.3, abs=0.02)
     assert found.overlap == 0.0
 
 
 def test_overlap_is_the_share_that_is_passed_over_twice():
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.13))
+    found = measure_path(BOARD, STRATEGY, lines(0.1, 0.13))
     assert found.coverage == pytest.approx(0.08 / 0.3, abs=0.02)
     assert found.overlap == pytest.approx(0.02 / 0.08, abs=0.05)
 
 
 def test_the_margin_need_not_be_covered_and_is_said_to_be_left_out():
     narrow = lines(0.125, 0.175, x=(0.09, 0.31))
-    all_of_it = measure_path(SURFACE, REGION, STRATEGY, narrow)
+    all_of_it = measure_path(BOARD, STRATEGY, narrow)
     assert all_of_it.coverage < 0.3 and all_of_it.unreached > 0.7
     assert all_of_it.left_out == {"no_clearance": 0.0, "edge_margin": 0.0}
-    inner = measure_path(SURFACE, REGION, replace(STRATEGY, edge_margin_m=0.1), narrow)
+    inner = measure_path(BOARD, replace(STRATEGY, edge_margin_m=0.1), narrow)
     assert inner.coverage == all_of_it.coverage  # of the whole region, whatever is left out
     assert inner.unreached < 0.01
     assert inner.left_out["edge_margin"] == pytest.approx(1 - 0.23, abs=0.03)
@@ -60,7 +60,7 @@ def test_the_margin_need_not_be_covered_and_is_said_to_be_left_out():
 
 @pytest.mark.parametrize("margin", [0.0, 0.03])
 def test_worked_left_out_and_unreached_add_up_to_the_whole_region(margin):
-    found = measure_path(SURFACE, REGION, replace(STRATEGY, edge_margin_m=margin), lines(0.1, 0.13))
+    found = measure_path(BOARD, replace(STRATEGY, edge_margin_m=margin), lines(0.1, 0.13))
     assert found.coverage + sum(found.left_out.values()) + found.unreached == pytest.approx(1.0)
     assert (found.left_out["edge_margin"] > 0.2) == (margin > 0)
 
@@ -68,12 +68,12 @@ def test_worked_left_out_and_unreached_add_up_to_the_whole_region(margin):
 def test_a_step_through_the_air_is_a_figure():
     whole = lines(0.1)
     (work,) = (s for s in whole if s.kind == "process")
-    assert measure_path(SURFACE, REGION, STRATEGY, whole).step_worst_m == pytest.approx(0.01)
+    assert measure_path(BOARD, STRATEGY, whole).step_worst_m == pytest.approx(0.01)
     kept = np.r_[0:11, 38:41]
     jump = replace(
         work, positions=work.positions[kept], quaternions_xyzw=work.quaternions_xyzw[kept]
     )
-    assert measure_path(SURFACE, REGION, STRATEGY, [jump]).step_worst_m == pytest.approx(0.28)
+    assert measure_path(BOARD, STRATEGY, [jump]).step_worst_m == pytest.approx(0.28)
 
 
 def test_the_largest_turn_between_waypoints_in_all_and_by_length():
@@ -81,12 +81,12 @@ def test_the_largest_turn_between_waypoints_in_all_and_by_length():
     turned = np.tile(DOWN.as_quat(), (41, 1))
     turned[20:] = (Rotation.from_euler("y", 0.6) * DOWN).as_quat()
     turned[30:] = -turned[30:]  # the other sign is the same orientation
-    found = measure_path(SURFACE, REGION, STRATEGY, [replace(work, quaternions_xyzw=turned)])
+    found = measure_path(BOARD, STRATEGY, [replace(work, quaternions_xyzw=turned)])
     assert found.turn_worst_rad == pytest.approx(0.6)
     assert found.bend_worst_rad_m == pytest.approx(0.6 / 0.01)
     # A spin about the tool's own axis is none.
     spun = (DOWN * Rotation.from_euler("z", np.linspace(0, 3, 41)[:, None])).as_quat()
-    found = measure_path(SURFACE, REGION, STRATEGY, [replace(work, quaternions_xyzw=spun)])
+    found = measure_path(BOARD, STRATEGY, [replace(work, quaternions_xyzw=spun)])
     assert found.turn_worst_rad == pytest.approx(0.0, abs=1e-6)
 
 
@@ -97,7 +97,7 @@ def test_a_step_counts_where_the_tool_is_as_well_as_on_the_surface():
     turns = Rotation.from_euler("y", np.where(np.arange(41) < 20, 0.0, 0.5)[:, None]) * DOWN
     places = work.positions - 0.1 * turns.as_matrix()[:, :, 2]
     found = measure_path(
-        SURFACE, REGION, high, [replace(work, positions=places, quaternions_xyzw=turns.as_quat())]
+        BOARD, high, [replace(work, positions=places, quaternions_xyzw=turns.as_quat())]
     )
     assert found.step_worst_m == pytest.approx(float(np.linalg.norm(places[20] - places[19])))
     assert found.step_worst_m > 0.05
@@ -108,12 +108,12 @@ def test_the_object_as_given_shows_what_the_plan_cannot_see():
     mesh = MeshSurface(
         np.array([[-1, -1, -4e-3], [2, -1, -4e-3], [0, 3, -4e-3]], float), [[0, 1, 2]]
     )
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)), mesh)
+    found = measure_path(BOARD, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)), mesh)
     assert found.surface_distance_worst_m < 1e-6
     assert found.true_distance_95_m == pytest.approx(4e-3)
     assert found.true_distance_worst_m == pytest.approx(4e-3)
     assert found.compared_with == "the mesh as given (1 triangles)"
-    alone = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)))
+    alone = measure_path(BOARD, STRATEGY, lines(0.1, 0.2, x=(0.05, 0.35)))
     assert alone.compared_with is None and alone.true_distance_worst_m is None
 
 
@@ -127,28 +127,35 @@ def test_the_surface_between_waypoints_is_compared_as_well():
     ends = replace(
         work, positions=work.positions[[0, -1]], quaternions_xyzw=work.quaternions_xyzw[:2]
     )
-    found = measure_path(SURFACE, REGION, STRATEGY, [ends], valley)
+    found = measure_path(BOARD, STRATEGY, [ends], valley)
     assert found.true_distance_worst_m == pytest.approx(0.1 * np.cos(np.arctan(0.5)), rel=0.05)
 
 
 def test_the_other_side_of_a_thin_board_is_not_reached():
-    surface = Surface(*two_sided(thickness=0.003))
-    one = measure_path(
-        surface, np.arange(len(surface.points)), STRATEGY, lines(0.025, 0.075, 0.125)
-    )
-    assert one.coverage == pytest.approx(0.25, abs=0.02)
+    top = BOARD.mesh
+    vertices = np.concatenate([top.vertices, top.vertices - [0.0, 0.0, 0.003]])
+    bottom = top.faces[:, ::-1] + len(top.vertices)
+    both = TargetMesh(vertices, np.concatenate([top.faces, bottom]))
+    region = RegionMesh.from_faces(both, np.ones(len(both.faces), bool))
+    found = measure_path(region, STRATEGY, lines(0.025, 0.075, 0.125))
+    assert found.coverage == pytest.approx(0.25, abs=0.02)
 
 
 def test_spacing_is_the_distance_to_the_lines_beside():
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.13, 0.18))
+    found = measure_path(BOARD, STRATEGY, lines(0.1, 0.13, 0.18))
     assert found.line_spacing_worst_m == pytest.approx(0.05, abs=1e-4)
     assert found.line_spacing_mean_m == pytest.approx(0.04, abs=1e-3)
-    alone = measure_path(SURFACE, REGION, STRATEGY, lines(0.1))
+    alone = measure_path(BOARD, STRATEGY, lines(0.1))
     assert alone.line_spacing_mean_m is None and alone.line_spacing_worst_m is None
 
 
 def test_spacing_is_measured_along_the_surface():
-    surface = Surface(*tube(radius=0.06, turn=np.pi))
+    half = sheet(
+        lambda u, v: np.stack(
+            [0.06 * np.cos(np.pi * (u - 0.5)), 0.06 * np.sin(np.pi * (u - 0.5)), 0.3 * v], axis=1
+        ),
+        1, 48,
+    )  # fmt: skip
     along = np.linspace(0.02, 0.28, 27)
     drawn, normals = [], []
     for angle in (-0.5, 0.5):
@@ -158,43 +165,41 @@ def test_spacing_is_measured_along_the_surface():
         )
         drawn.append(process_segment(0.06 * outward + np.c_[np.zeros((27, 2)), along], turn))
         normals.append(np.tile(outward, (27, 1)))
-    found = measure_path(
-        surface,
-        np.arange(len(surface.points)),
-        STRATEGY,
-        add_approach_retract(drawn, normals, STRATEGY),
-    )
+    found = measure_path(half, STRATEGY, add_approach_retract(drawn, normals, STRATEGY))
     assert found.line_spacing_mean_m == pytest.approx(0.06, rel=0.02)  # the chord is 0.0575
 
 
 def test_a_line_beyond_a_gap_is_no_neighbour():
-    points, normals = board(spacing=0.008)
-    gap = np.abs(points[:, 1] - 0.15) < 0.02
-    left = (points[:, 0] > 0.02) & (points[:, 0] < 0.38)
-    surface = Surface(points[~(gap & left)], normals[~(gap & left)])
-    found = measure_path(
-        surface, np.arange(len(surface.points)), STRATEGY, lines(0.11, 0.19, x=(0.05, 0.35))
-    )
+    rows = np.array([0.0, 0.13, 0.17, 0.3])
+    corners = np.array([[x, y, 0.0] for y in rows for x in (0.0, 0.02, 0.38, 0.4)])
+    cells = [(r, c) for r in range(3) for c in range(3) if (r, c) != (1, 1)]
+    faces = [
+        face
+        for r, c in cells
+        for a in [4 * r + c]
+        for face in ((a, a + 1, a + 5), (a, a + 5, a + 4))
+    ]
+    mesh = TargetMesh(corners, np.array(faces))
+    frame = RegionMesh.from_faces(mesh, np.ones(len(faces), bool))
+    found = measure_path(frame, STRATEGY, lines(0.11, 0.19, x=(0.05, 0.35)))
     assert found.line_spacing_worst_m is None
 
 
 def test_height_over_the_surface_counts_but_the_stand_off_does_not():
-    off = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, z=0.002, x=(0.05, 0.35)))
+    off = measure_path(BOARD, STRATEGY, lines(0.1, 0.2, z=0.002, x=(0.05, 0.35)))
     assert off.surface_distance_worst_m == pytest.approx(0.002, abs=1e-6)
     assert off.surface_distance_99_m == pytest.approx(0.002, abs=1e-6)
     held = replace(STRATEGY, standoff_m=0.002)
-    right = measure_path(SURFACE, REGION, held, lines(0.1, 0.2, z=0.002, x=(0.05, 0.35)))
+    right = measure_path(BOARD, held, lines(0.1, 0.2, z=0.002, x=(0.05, 0.35)))
     assert right.surface_distance_worst_m < 1e-6
 
 
 def test_the_axis_is_compared_with_the_one_asked_for():
     tilted = DOWN * Rotation.from_euler("Y", -0.25)
-    found = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2, turn=tilted))
+    found = measure_path(BOARD, STRATEGY, lines(0.1, 0.2, turn=tilted))
     assert found.axis_error_99_rad == pytest.approx(0.25, abs=1e-6)
     asked = replace(STRATEGY, lead_rad=0.25)
-    assert (
-        measure_path(SURFACE, REGION, asked, lines(0.1, 0.2, turn=tilted)).axis_error_99_rad < 1e-6
-    )
+    assert measure_path(BOARD, asked, lines(0.1, 0.2, turn=tilted)).axis_error_99_rad < 1e-6
 
 
 def test_lengths_and_times_add_up():
@@ -202,7 +207,7 @@ def test_lengths_and_times_add_up():
         STRATEGY, dwell_s=0.5, approach_distance_m=0.05, retract_distance_m=0.02,
         approach_feed_m_s=0.2, retract_feed_m_s=0.4,
     )  # fmt: skip
-    found = measure_path(SURFACE, REGION, strategy, lines(0.1, 0.2, strategy=strategy))
+    found = measure_path(BOARD, strategy, lines(0.1, 0.2, strategy=strategy))
     assert found.process_length_m == pytest.approx(0.8)
     between = np.hypot(np.hypot(0.4, 0.1), 0.03)  # from one line's retract to the next's approach
     assert found.path_length_m == pytest.approx(0.8 + 2 * 0.07 + between)
@@ -212,8 +217,8 @@ def test_lengths_and_times_add_up():
 
 def test_passes_are_driven_but_overlap_is_that_of_one():
     twice = replace(STRATEGY, passes=2)
-    one = measure_path(SURFACE, REGION, STRATEGY, lines(0.1, 0.2))
-    two = measure_path(SURFACE, REGION, twice, lines(0.1, 0.2, strategy=twice))
+    one = measure_path(BOARD, STRATEGY, lines(0.1, 0.2))
+    two = measure_path(BOARD, twice, lines(0.1, 0.2, strategy=twice))
     assert two.process_length_m == pytest.approx(2 * one.process_length_m)
     assert (two.coverage, two.overlap) == (one.coverage, one.overlap)
 
@@ -221,4 +226,4 @@ def test_passes_are_driven_but_overlap_is_that_of_one():
 def test_a_path_that_only_moves_freely_is_refused():
     free = [segment for segment in lines(0.1) if segment.kind != "process"]
     with pytest.raises(ProcessError, match="without a process segment"):
-        measure_path(SURFACE, REGION, STRATEGY, free)
+        measure_path(BOARD, STRATEGY, free)

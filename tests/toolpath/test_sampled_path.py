@@ -1,70 +1,40 @@
-"""Which lines are beside each other, and how far apart."""
+"""What a footprint passes over along a path that is sampled densely."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from nrdf.surface.patch import Patch, patches_of
-from nrdf.surface.surface import Surface
-from nrdf.toolpath.sampled_path import _placed, line_spacing, sample_lines
-from nrdf.toolpath.surface_path import SurfacePath
+from nrdf.toolpath.sampled_path import SampledPath, reached_points
 
-WIDE, THIN, LENGTH, STEPOVER = 0.06, 0.02, 0.3, 0.025
+DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def bar(spacing: float = 0.017) -> Surface:
-    """The four long faces of a bar along z, of few points: one or two across its thin sides."""
-    rng = np.random.default_rng(3)
-    points, normals = [], []
-    for axis, across, half in ((0, WIDE, THIN / 2), (1, THIN, WIDE / 2)):
-        for side in (-1.0, 1.0):
-            count = int(across * LENGTH / spacing**2)
-            face = np.zeros((count, 3))
-            face[:, axis], face[:, 1 - axis] = side * half, rng.uniform(-0.5, 0.5, count) * across
-            face[:, 2] = rng.uniform(0.0, LENGTH, count)
-            points.append(face)
-            normals.append(np.tile(side * np.eye(3)[axis], (count, 1)))
-    return Surface(np.concatenate(points), np.concatenate(normals))
+def straight(*levels, length=0.3):
+    x = np.linspace(0.0, length, 16)
+    lines = [np.stack([x, np.full(16, y), np.zeros(16)], axis=1) for y in levels]
+    return SampledPath.along(lines, [np.tile(DOWN, (16, 1))] * len(levels), 0.005, 0.01)
 
 
-def along(x: float, y: float, normal: tuple[float, float, float]) -> SurfacePath:
-    z = np.linspace(0.02, LENGTH - 0.02, 27)
-    return SurfacePath(np.c_[np.full(27, x), np.full(27, y), z], np.tile(normal, (27, 1)))
+def test_samples_are_even_and_lines_are_far_apart_along_the_way():
+    sampled = straight(0.0, 0.1)
+    steps = np.diff(sampled.arc_length)
+    assert np.sort(steps)[-1] > 100.0  # from line to line
+    assert np.sort(steps)[:-1] == pytest.approx(0.005, rel=0.02)
+    np.testing.assert_allclose(sampled.travel, np.tile([1.0, 0.0, 0.0], (len(sampled.places), 1)))
 
 
-def round_the_bar() -> list[SurfacePath]:
-    """Lines no farther than a stepover apart round the bar, some of them close to its edges."""
-    levels = (-0.027, -0.009, 0.009, 0.027)
-    faces = [along(side * THIN / 2, y, (side, 0, 0)) for side in (-1.0, 1.0) for y in levels]
-    return faces + [along(0.0, side * WIDE / 2, (0, side, 0)) for side in (-1.0, 1.0)]
+def test_a_point_is_counted_once_a_passage():
+    points = np.array([[0.15, y, 0.0] for y in (0.0, 0.02, 0.05, 0.09)])
+    up = np.tile(-DOWN, (4, 1))
+    counts = straight(0.0, 0.03, 0.06).coverage_count(points, up, 0.025)
+    assert counts.tolist() == [1, 2, 2, 0]
+    assert straight(0.0).coverage_count(points[:0], up[:0], 0.025).shape == (0,)
 
 
-def test_a_place_next_to_an_edge_is_on_the_face_of_its_tool():
-    up, right = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
-    points = np.array([[-0.01, 0.0, 0.0], [0.001, 0.0, -0.004]])
-    tangents = np.array([[right, [0.0, 1.0, 0.0]], [[0.0, 1.0, 0.0], up]])
-    uv = np.array([[0.0, 0.0], [1.0, 1.0]])
-    patch = Patch(np.arange(2), points, uv, tangents, np.zeros(2, int), 0.01)
-    place = np.zeros((1, 3))
-    for tail, point, where in ((up, 0, [0.01, 0.0]), (right, 1, [1.0, 1.004])):
-        _, next_to, found = _placed(patch, place, tail[None], np.ones(2, bool))
-        assert next_to[0] == point
-        np.testing.assert_allclose(found, [where])
-
-
-def test_a_line_that_is_missing_on_a_bar_is_missed():
-    surface = bar()
-    patches = patches_of(surface, np.arange(len(surface.points)))
-    lines = [line for k, line in enumerate(round_the_bar()) if k not in (1, 2)]
-    found = line_spacing(patches, sample_lines(lines, 0.025, STEPOVER), STEPOVER)
-    assert found.distance.max() > 1.5 * STEPOVER
-
-
-def test_a_line_that_faces_no_patch_is_beside_none():
-    surface = bar()
-    patches = patches_of(surface, np.flatnonzero(surface.normals[:, 0] > 0.5))
-    upright = [along(THIN / 2, y, (1, 0, 0)) for y in (-0.02, 0.02)]
-    astray = [*upright, along(THIN / 2, 0.0, (-1, 0, 0))]
-    for lines in (upright, astray):
-        found = line_spacing(patches, sample_lines(lines, 0.025, STEPOVER), STEPOVER)
-        np.testing.assert_allclose(found.distance, 0.04, atol=2e-3)
+def test_the_other_side_is_not_reached():
+    points, outward = np.array([[0.1, 0.0, 0.0]] * 2), np.array([[0, 0, 1.0], [0, 0, -1.0]])
+    sampled = straight(0.0)
+    found = reached_points(points, outward, sampled.places, sampled.axes, 0.025)
+    assert found.tolist() == [True, False]
+    assert not reached_points(points, outward, points[:0], points[:0], 0.025).any()

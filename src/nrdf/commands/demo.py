@@ -241,9 +241,10 @@ def _reference_panel(title: str, process_transfer: ProcessTransfer) -> Panel:
     lines: dict[str, list[np.ndarray]] = {}
     for region, number, _ in process_transfer.steps():
         lines.setdefault(region, []).extend(process_transfer.reference_contacts(region, number))
-    bound = process_transfer.bound_knowledge
-    note = f"{len(bound.regions)} regions, each with a process of its own"
-    return Panel(title, bound.cloud.points, None, bound.regions, note, lines)
+    paths = process_transfer.reference_paths
+    regions = {name: region.mesh for name, region in paths.regions.found.items()}
+    note = f"{len(regions)} regions, each with a process of its own"
+    return Panel.of_mesh(title, paths.surface.mesh, regions, lines, note=note)
 
 
 def _compare(chair: str, result: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.normals import estimate_normals
-from nrdf.geometry.sampling import distinct_points, downsample, indices_in_subset
 from nrdf.geometry.units import readable
 from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
+from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import normals_under, taught_segments
-from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
-from nrdf.surface.patch import patches_of
-from nrdf.surface.surface import Surface
+from nrdf.surface.given_surface import GivenSurface, given_surface
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
-from nrdf.toolpath.planner import plan
 from nrdf.toolpath.tool_segments import add_approach_retract
 from nrdf.toolpath.types import Segment
 
@@ -53,35 +50,26 @@ def check_knowledge(
     bound_knowledge: BoundKnowledge, progress: Callable[[int, int], None] | None = None
 ) -> list[CheckedProcess]:
     """Plan and measure every process on the reference; `progress` is called with (done, all)."""
-    # The same points that a model works with.
-    kept = downsample(bound_knowledge.cloud.points, WORKING_POINTS, np.random.default_rng(0))
-    cloud = bound_knowledge.cloud.select(kept)
-    normals = estimate_normals(cloud.points) if cloud.normals is None else cloud.normals
-    distinct = distinct_points(cloud.points, normals)
-    surface = Surface(cloud.points[distinct], normals[distinct])
-    given = given_surface(with_normals_of(bound_knowledge.cloud, replace(cloud, normals=normals)))
-    count = len(bound_knowledge.cloud)
-    regions = {
-        name: indices_in_subset(kept[distinct], indices, count)
-        for name, indices in bound_knowledge.regions.items()
-    }
+    reference = ReferencePaths(bound_knowledge)
+    given = given_surface(reference.cloud)
     steps = [(region.name, p) for region in bound_knowledge.knowledge.regions for p in region.steps]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
-        checked.append(check_process(surface, name, regions[name], process, given))
+        try:
+            region = reference.region(name)
+        except ProcessError as error:
+            checked.append(CheckedProcess(name, process, str(error)))
+        else:
+            checked.append(check_process(region, name, process, given))
         if progress is not None:
             progress(done, len(steps))
     return checked
 
 
 def check_process(
-    surface: Surface,
-    name: str,
-    region: np.ndarray,
-    process: Process,
-    given: GivenSurface | None = None,
+    region: RegionMesh, name: str, process: Process, given: GivenSurface | None = None
 ) -> CheckedProcess:
-    """One process planned and measured on a region, indices (k,) of the surface's points.
+    """One process planned and measured on a region of the reference's mesh.
 
     given: the object as the user gave it, which the tool path is measured against.
     """
@@ -97,21 +85,23 @@ def check_process(
     try:
         strategy = strategy_of(process)
         if process.waypoints is None:
-            _check_spacing(surface, region, process)
-            segments = plan(surface, region, strategy)
+            _check_spacing(region, process)
+            segments = plan_on_mesh(region, strategy)
         else:
-            taught = taught_segments(process, surface)
-            segments = add_approach_retract(taught, normals_under(surface, taught), strategy)
-        metrics = measure_path(surface, region, strategy, segments, given)
+            taught = taught_segments(process, region.parent)
+            normals = normals_under(region.parent, taught, strategy.tool_radius_m)
+            segments = add_approach_retract(taught, normals, strategy)
+        metrics = measure_path(region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))
     warnings += path_warnings(process, metrics)
     return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments))
 
 
-def _check_spacing(surface: Surface, region: np.ndarray, process: Process) -> None:
+def _check_spacing(region: RegionMesh, process: Process) -> None:
     """Raise ProcessError for a spacing longer than the region, unless `allow_unusual` is set."""
-    length = max(patch.extent[0] for patch in patches_of(surface, region))
+    away = region.mesh.vertices - region.mesh.vertices.mean(axis=0)
+    length = float(np.ptp(away @ np.linalg.eigh(away.T @ away)[1], axis=0).max())
     if process.spacing_m > length and not process.allow_unusual:
         spacing = f"{process.spacing_m:g} ({readable('spacing_m', process.spacing_m)})"
         raise ProcessError(

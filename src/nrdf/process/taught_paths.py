@@ -1,4 +1,4 @@
-"""Taught waypoints on the reference, and the surface under a tool."""
+"""Taught waypoints as segments on the reference's mesh, and what they are over."""
 
 from __future__ import annotations
 
@@ -7,31 +7,26 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.frames import z_axes
 from nrdf.geometry.units import readable
 from nrdf.process.process import Process, TaughtSegment
 from nrdf.regions.region import ON_REFERENCE
-from nrdf.surface.surface import Surface
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.frames import tool_quaternions, travel_directions
 from nrdf.toolpath.types import Segment
 
-_SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
-_FACING = 0.1  # cosine above which a side faces a tool: the side round a square corner does not
 
-
-def taught_segments(process: Process, surface: Surface) -> tuple[Segment, ...]:
+def taught_segments(process: Process, mesh: TargetMesh) -> tuple[Segment, ...]:
     """A process segment for each line of a taught process.
 
     Where a line gives no orientations, the tool follows the reference's surface. Raises
     ProcessError, naming line and waypoint, for one that is farther from the surface than its
     stand-off and 2 % of the object's longest side.
     """
-    allowed = process.standoff_m + ON_REFERENCE * float(np.ptp(surface.points, axis=0).max())
+    allowed = process.standoff_m + ON_REFERENCE * mesh.size
     segments = []
     for number, line in enumerate(process.waypoints or ()):
         positions = np.array(line.positions_m, float)
-        # What lies between points is on the surface.
-        away = np.maximum(surface.tree.query(positions)[0] - surface.spacing, 0.0)
+        away = mesh.nearest(positions).distances
         if (away > allowed).any():
             worst = int(away.argmax())
             raise ProcessError(
@@ -40,7 +35,7 @@ def taught_segments(process: Process, surface: Surface) -> tuple[Segment, ...]:
                 f"{readable('allowed_m', allowed)} is allowed with standoff_m "
                 f"{process.standoff_m:g}. Is it in the reference's frame, in metres?"
             )
-        quaternions = _quaternions(line, positions, process, surface)
+        quaternions = _quaternions(line, positions, process, mesh)
         segments.append(
             Segment(
                 "process", number, positions, quaternions,
@@ -51,52 +46,26 @@ def taught_segments(process: Process, surface: Surface) -> tuple[Segment, ...]:
 
 
 def _quaternions(
-    line: TaughtSegment, positions: np.ndarray, process: Process, surface: Surface
+    line: TaughtSegment, positions: np.ndarray, process: Process, mesh: TargetMesh
 ) -> np.ndarray:
     """The orientations (n, 4) of a taught line, given or from the surface."""
     if line.quaternions_xyzw is not None:
         return np.array(line.quaternions_xyzw, float)
-    nearest = surface.tree.query(positions)[1]
-    normals = surface.project(surface.points[nearest], surface.normals[nearest])[1]
+    near = mesh.nearest(positions)
+    normals = mesh.smooth_normals(near.points, near.faces, process.tool.radius_m)
     if len(positions) > 1:
-        travel = travel_directions(positions, _SMOOTH * surface.spacing)
+        travel = travel_directions(positions, 0.5 * process.distance_between_lines_m)
     else:
         travel = np.array([process.direction or (1.0, 0.0, 0.0)])
     return tool_quaternions(travel, normals, process.lead_rad, process.tilt_rad)
 
 
-def surface_under(
-    surface: Surface, positions: np.ndarray, axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The smooth surface under tools at positions (m, 3), and its normals there, each (m, 3).
-
-    axes: (m, 3), from the tool's tip to its tail; the nearest surface that faces the tail counts,
-    so that a tool near a thin part's edge stays on its side.
-    """
-    near = surface.tree.query(positions, np.arange(1, min(32, len(surface.points)) + 1))[1]
-    facing = np.einsum("mka,ma->mk", surface.normals[near], axes) > _FACING
-    # The first that faces the tool, or the nearest of all.
-    first = near[np.arange(len(near)), facing.argmax(axis=1)]
-    start, normals = surface.points[first], surface.normals[first]
-    height = np.einsum("ma,ma->m", positions - start, normals)
-    sideways = positions - start - height[:, None] * normals
-    length = np.linalg.norm(sideways, axis=1, keepdims=True)
-    sideways *= np.minimum(1.0, 2 * surface.spacing / np.maximum(length, 1e-12))
-    return surface.project(start + sideways, normals)
-
-
-def normals_under(surface: Surface, segments: Sequence[Segment]) -> list[np.ndarray]:
-    """Outward normals (n, 3) of the surface under the tool at each segment's waypoints."""
+def normals_under(
+    mesh: TargetMesh, segments: Sequence[Segment], tool_radius_m: float
+) -> list[np.ndarray]:
+    """Outward normals (n, 3) of the surface under a flat tool at each segment's waypoints."""
     found = []
     for segment in segments:
-        found.append(surface_under(surface, segment.positions, -segment.axes)[1])
+        near = mesh.nearest(segment.positions, -segment.axes)
+        found.append(mesh.smooth_normals(near.points, near.faces, tool_radius_m))
     return found
-
-
-def contact_points(
-    positions: np.ndarray, quaternions_xyzw: np.ndarray, standoff_m: float
-) -> np.ndarray:
-    """Where tools at positions (n, 3) touch or point at the surface, (n, 3): a stand-off ahead of
-    the tool centre point, along tool z."""
-    along = z_axes(quaternions_xyzw)
-    return np.asarray(positions + standoff_m * along)

@@ -11,7 +11,6 @@ targets.
 from __future__ import annotations
 
 import logging
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,8 +23,6 @@ from numpy.typing import ArrayLike
 
 from nrdf.errors import ModelError, ProcessError, RegionError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.geometry.polylines import longest_step
-from nrdf.geometry.units import readable
 from nrdf.io.bounds import FRACTION
 from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
@@ -36,33 +33,23 @@ from nrdf.process.bound_knowledge import (
     unit_and_warnings,
 )
 from nrdf.process.correspondence import Correspondence, ReferenceSurface
-from nrdf.process.process import Process, TaughtSegment
-from nrdf.process.strategy import strategy_of, tool_path
-from nrdf.process.taught_paths import contact_points, taught_segments
+from nrdf.process.object_regions import ObjectSurface, Votes, object_surface, reason, regions_on
+from nrdf.process.reference_paths import ReferencePaths
+from nrdf.process.target_paths import Step, TargetPaths
 from nrdf.process.transfer_result import (
     MIN_CONFIDENCE,
     FoundRegion,
-    PathResult,
     TransferResult,
     reason_to_skip,
 )
-from nrdf.process.warp import warp_segments
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind_check import KindCheck
-from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
-from nrdf.surface.target_mesh import TargetMesh
-from nrdf.toolpath.mesh_projection import on_mesh, target_mesh_of
-from nrdf.toolpath.metrics import measure_path
-from nrdf.toolpath.planner import plan
-from nrdf.toolpath.tool_segments import add_approach_retract
+from nrdf.surface.given_surface import given_surface, with_normals_of
 from nrdf.toolpath.types import Segment
 
 log = logging.getLogger(__name__)
-
-_LONGER = 2.0  # times the longest step on the reference, from which a warped one is reported
-_THREADS = 4  # that plan: numpy leaves them little to do at once
 
 
 class ProcessTransfer:
@@ -73,6 +60,7 @@ class ProcessTransfer:
     Attributes:
         bound_knowledge: the knowledge with its reference's cloud and regions.
         reference: that cloud, encoded.
+        reference_paths: its mesh and regions, and the paths on them.
     """
 
     def __init__(self, bound_knowledge: BoundKnowledge, model: Model) -> None:
@@ -85,7 +73,7 @@ class ProcessTransfer:
         self.bound_knowledge, self.model = bound_knowledge, model
         self.reference = model.set_reference(bound_knowledge.cloud)
         self.reference_surface = ReferenceSurface(self.reference)
-        self._segments: dict[tuple[str, int], tuple[Segment, ...]] = {}
+        self.reference_paths = ReferencePaths(bound_knowledge)
 
     def transfer(
         self,
@@ -133,38 +121,44 @@ class ProcessTransfer:
             target_warnings = unit_warnings
             for warning in (*unit_warnings, *kind.warnings):
                 log.warning("%s", warning)
-        matches = self.reference.retrieve_all(regions, encoded, check=False)
-        matches |= _marked_matches(marked or {}, matches, encoded)
-        found = {
-            n: FoundRegion(n, m, reason_to_skip(m, min_confidence)) for n, m in matches.items()
-        }
-        seconds = {"regions": time.perf_counter() - start}
-        start = time.perf_counter()
-        correspondence = Correspondence(self.reference_surface, encoded)
-        seconds["surface"] = time.perf_counter() - start
-        start = time.perf_counter()
         cloud = with_normals(encoded)
         complete = cloud if whole is None else with_normals_of(whole, cloud)
-        given, mesh = given_surface(complete), target_mesh_of(complete)
-        paths = self._paths(found, correspondence, given, mesh, progress)
+        with ThreadPoolExecutor(1) as pool:
+            meshing = pool.submit(_surface_or_reason, complete, self.bound_knowledge)
+            matches = self.reference.retrieve_all(regions, encoded, check=False)
+            matches |= _marked_matches(marked or {}, matches, encoded)
+            found = {
+                n: FoundRegion(n, m, reason_to_skip(m, min_confidence)) for n, m in matches.items()
+            }
+            seconds = {"regions": time.perf_counter() - start}
+            start = time.perf_counter()
+            surface, fault = meshing.result()
+        found = self._on_mesh(found, encoded, surface, fault)
+        seconds["surface"] = time.perf_counter() - start
+        start = time.perf_counter()
+        correspondence = Correspondence(self.reference_surface, encoded)
+        target_paths = TargetPaths(self.reference_paths, correspondence, given_surface(complete))
+        paths = target_paths.all(self.steps(), found, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
         skipped = [
             f"region '{r.name}' is skipped: {r.missing}" for r in found.values() if r.missing
         ]
+        said = () if surface is None else surface.warnings
         return TransferResult(
             bound_knowledge=self.bound_knowledge,
             target=cloud,
             regions=found,
             paths=paths,
-            warnings=(*skipped, *(line.split(";")[0] for line in shared)),
+            warnings=(*said, *skipped, *(line.split(";")[0] for line in shared)),
             seconds=seconds,
             pose=encoded.pose,
             target_warnings=tuple(target_warnings),
             kind=kind,
+            surface=None if surface is None else surface.mesh,
         )
 
-    def steps(self) -> list[tuple[str, int, Process]]:
+    def steps(self) -> list[Step]:
         """Every process with its region and number there, in the order in which they are done."""
         steps = [
             (region.name, number, process)
@@ -175,24 +169,11 @@ class ProcessTransfer:
 
     def reference_segments(self, region: str, number: int) -> tuple[Segment, ...]:
         """The process segments of a process on the reference: as taught, or planned there."""
-        if (region, number) not in self._segments:
-            process, surface = self._process(region, number), self.reference_surface.surface
-            if process.waypoints is not None:
-                segments = taught_segments(process, surface)
-            else:
-                inside = self.reference.encoded_cloud.to_working(
-                    self.bound_knowledge.regions[region]
-                )
-                once = replace(strategy_of(process), passes=1)
-                segments = tuple(s for s in plan(surface, inside, once) if s.kind == "process")
-            self._segments[region, number] = segments
-        return self._segments[region, number]
+        return self.reference_paths.segments(region, number)
 
     def reference_contacts(self, region: str, number: int) -> list[np.ndarray]:
         """The points (n, 3) of the reference's surface that each segment of a process works."""
-        height = self._process(region, number).standoff_m
-        segments = self.reference_segments(region, number)
-        return [contact_points(s.positions, s.quaternions_xyzw, height) for s in segments]
+        return self.reference_paths.contacts(region, number)
 
     def _encode(self, target: Any, unit: str | None) -> tuple[EncodedCloud, Sequence[str]]:
         """The target encoded, in metres, and what is uncertain about its unit."""
@@ -203,102 +184,38 @@ class ProcessTransfer:
         known, warnings = unit_and_warnings(target, unit, category, "the target", "unit")
         return self.model.encode(in_metres(target, known)), warnings
 
-    def _process(self, region: str, number: int) -> Process:
-        named = {r.name: r for r in self.bound_knowledge.knowledge.regions}
-        return named[region].processes[number]
-
-    def _paths(
+    def _on_mesh(
         self,
         found: Mapping[str, FoundRegion],
-        correspondence: Correspondence,
-        given: GivenSurface,
-        mesh: TargetMesh | None,
-        progress: Callable[[int, int], None] | None,
-    ) -> tuple[PathResult, ...]:
-        """Every process on the target, planned by several threads."""
-        correspondence.target_surface.edges  # noqa: B018, what all paths share
-        steps, paths = self.steps(), []
-        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
-            planned = [
-                pool.submit(self._path, *step, found[step[0]], correspondence, given, mesh)
-                for step in steps
-            ]
-            try:
-                for done, path in enumerate(planned):
-                    if progress is not None:
-                        progress(done + 1, len(steps) + 1)
-                    paths.append(path.result())
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-        return tuple(paths)
+        encoded: EncodedCloud,
+        surface: ObjectSurface | None,
+        fault: str,
+    ) -> dict[str, FoundRegion]:
+        """The regions with their meshes, or why they have none."""
+        there = {name: r.match.working for name, r in found.items() if not r.missing}
+        if surface is None:
+            return {n: replace(r, missing=r.missing or fault) for n, r in found.items()}
+        points, normals = (
+            encoded.original(encoded.points),
+            encoded.original_normals(encoded.normals),
+        )
+        votes = Votes(points, normals, there)
+        meshes = regions_on(surface.mesh, votes, self.bound_knowledge.knowledge)
+        placed = dict(found)
+        for name in there:
+            missing = reason(meshes.left_out.get(name, ""))
+            placed[name] = replace(found[name], missing=missing, mesh=meshes.found.get(name))
+        return placed
 
-    def _path(
-        self,
-        region: str,
-        number: int,
-        process: Process,
-        found: FoundRegion,
-        correspondence: Correspondence,
-        given: GivenSurface,
-        mesh: TargetMesh | None,
-    ) -> PathResult:
-        """One process on one region of the target."""
-        made = PathResult(region, number, process, process.transfer_mode)
-        if found.missing:
-            return replace(made, reason=found.missing)
-        surface = correspondence.target_surface
-        inside = found.match.working
-        if process.direction is not None:
-            indices = self.bound_knowledge.regions[region]
-            direction = correspondence.map_direction(indices, np.array(process.direction))
-            process = process.model_copy(update={"direction": tuple(direction.tolist())})
-        strategy = strategy_of(process)
-        warnings: tuple[str, ...] = ()
-        try:
-            if process.transfer_mode == "replan":
-                segments = on_mesh(plan(surface, inside, strategy), mesh, strategy)
-            else:
-                step = region, number, process, correspondence, mesh
-                process, segments, warnings = self._warp(*step)
-            metrics = measure_path(surface, inside, strategy, segments, given)
-        except ProcessError as error:
-            return replace(made, process=process, reason=str(error))
-        path = tool_path(region, process, segments)
-        return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
 
-    def _warp(
-        self,
-        region: str,
-        number: int,
-        process: Process,
-        correspondence: Correspondence,
-        mesh: TargetMesh | None,
-    ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
-        """A process with its waypoints warped to the target, its segments there, and warnings."""
-        here = self.reference_segments(region, number)
-        there, lost = warp_segments(correspondence, here, process.tool.radius_m)
-        there = on_mesh(there, mesh, strategy_of(process))
-        total = sum(len(segment.positions) for segment in here)
-        if not there:
-            raise ProcessError(f"none of the {total} waypoints has a place on the target")
-        warnings = [f"{lost} of {total} waypoints have no place on the target"] if lost else []
-        longest, warped = (max(longest_step(s.positions) for s in of) for of in (here, there))
-        if warped > _LONGER * longest:
-            warnings.append(
-                f"a step of {readable('_m', warped)} between neighbouring waypoints; the longest "
-                f"on the reference is {readable('_m', longest)}"
-            )
-        normals = [segment.normals for segment in there]
-        segments = add_approach_retract(there, normals, strategy_of(process))
-        waypoints = [
-            TaughtSegment(
-                positions_m=s.positions.tolist(), quaternions_xyzw=s.quaternions_xyzw.tolist()
-            )
-            for s in there
-        ]
-        changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
-        return process.model_copy(update=changes), segments, tuple(warnings)
+def _surface_or_reason(
+    cloud: PointCloud, bound_knowledge: BoundKnowledge
+) -> tuple[ObjectSurface | None, str]:
+    """An object's mesh, or why there is none."""
+    try:
+        return object_surface(cloud, bound_knowledge.knowledge), ""
+    except ProcessError as error:
+        return None, str(error)
 
 
 def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:

@@ -10,6 +10,8 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.process import Process, TransferMode
 from nrdf.regions.match import Match
 from nrdf.scans.kind_check import KindCheck
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.metrics import ToolPathMetrics
 from nrdf.toolpath.types import ToolPath
 
@@ -19,11 +21,15 @@ MIN_CONFIDENCE = 0.25
 
 @dataclass(frozen=True)
 class FoundRegion:
-    """A region on the target: its match; `missing` says why it is skipped, "" where it is not."""
+    """A region on the target: its match; `missing` says why it is skipped, "" where it is not.
+
+    mesh: the region's part of the target's mesh; None where it is skipped.
+    """
 
     name: str
     match: Match
     missing: str = ""
+    mesh: RegionMesh | None = None
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,7 @@ class TransferResult:
         pose: from canonical coordinates to the target's: how the object lies there.
         target_warnings: what is uncertain about the object's pose and unit.
         kind: what it looks like.
+        surface: the target's mesh, which the paths are planned on; None where there is none.
 
     All warnings together: `nrdf.process.limits.strict_warnings`.
     """
@@ -72,6 +79,7 @@ class TransferResult:
     pose: Similarity | None = None
     target_warnings: tuple[str, ...] = ()
     kind: KindCheck | None = None
+    surface: TargetMesh | None = None
 
 
 def reason_to_skip(match: Match, min_confidence: float) -> str:

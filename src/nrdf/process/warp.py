@@ -14,12 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.polylines import step_lengths
 from nrdf.process.correspondence import Correspondence
-from nrdf.process.taught_paths import surface_under
+from nrdf.surface.surface import Surface
 from nrdf.toolpath.frames import surface_frames, travel_directions
 from nrdf.toolpath.types import Segment
 
 _TORN, _GAP = 1.5, 1.2  # times its length on the reference, and spacings, that a step may have
 _SMOOTH = 2.0  # spacings of points over which the direction of travel is averaged
+_FACING = 0.1  # cosine above which a side faces a tool: the side round a square corner does not
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,26 @@ def warp_segments(
                 )
             )
     return tuple(warped), lost
+
+
+def surface_under(
+    surface: Surface, positions: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smooth surface under tools at positions (m, 3), and its normals there, each (m, 3).
+
+    axes: (m, 3), from the tool's tip to its tail; the nearest surface that faces the tail counts,
+    so that a tool near a thin part's edge stays on its side.
+    """
+    near = surface.tree.query(positions, np.arange(1, min(32, len(surface.points)) + 1))[1]
+    facing = np.einsum("mka,ma->mk", surface.normals[near], axes) > _FACING
+    # The first that faces the tool, or the nearest of all.
+    first = near[np.arange(len(near)), facing.argmax(axis=1)]
+    start, normals = surface.points[first], surface.normals[first]
+    height = np.einsum("ma,ma->m", positions - start, normals)
+    sideways = positions - start - height[:, None] * normals
+    length = np.linalg.norm(sideways, axis=1, keepdims=True)
+    sideways *= np.minimum(1.0, 2 * surface.spacing / np.maximum(length, 1e-12))
+    return surface.project(start + sideways, normals)
 
 
 def _frames(

@@ -50,7 +50,8 @@ def write_transfer_html(
         "colours": colours,
         "columns": list(METRIC_COLUMNS),
         "cells": metric_cells,
-        "properties": _properties,
+        "properties": lambda path: _properties(path, report["regions"][path["region"]]),
+        "surface": _surface(report["surface"]),
         "seconds": ", ".join(f"{name} {value:.2f} s" for name, value in report["seconds"].items()),
         "versions": [versions] if versions else [],
     }
@@ -103,6 +104,18 @@ def _header(report: Mapping[str, Any]) -> list[str]:
     return [*words, f"frame {report['frame'] or 'of the target file'}, positions in metres"]
 
 
+def _surface(surface: Mapping[str, Any] | None) -> list[str]:
+    """The mesh that was planned on, in words; nothing where there is none."""
+    if surface is None:
+        return []
+    edges = readable("edge_length_m", surface["edge_length_m"])
+    said = [
+        f"Planned on a mesh of {surface['faces']} triangles, edges of {edges}",
+        *surface["repairs"],
+    ]
+    return ["; ".join(said)]
+
+
 def _cards(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     """The numbers at the top, each with its name."""
     total, regions = report["total"], report["regions"]
@@ -118,7 +131,7 @@ def _cards(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def _properties(path: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _properties(path: Mapping[str, Any], region: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What was requested of a tool path, by name and value, as people read it."""
     requested, metrics = path["requested"], path["metrics"]
     tool = requested["tool"]
@@ -140,6 +153,9 @@ def _properties(path: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("force, feed", f"{quantity('force_n')}, {quantity('feed_m_s')}"),
         ("left out of the region", left_out_in_words(metrics["left_out"])),
     ]  # fmt: skip
+    if region["area_m2"] is not None:
+        area = f"{1e4 * region['area_m2']:.0f} cm²"
+        lines.append(("region", ", ".join([area, *region["changes"]])))
     if metrics["compared_with"] is not None:
         lines.append(("compared with", metrics["compared_with"]))
     if requested.get("spindle_rad_s") is not None:

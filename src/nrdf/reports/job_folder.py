@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from nrdf.geometry.mesh import Mesh
 from nrdf.io.atomic import write_json
 from nrdf.io.cloud import write_cloud
 from nrdf.io.output import output_folder
@@ -19,12 +20,14 @@ from nrdf.process.bound_knowledge import checksum, overlaps
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
-from nrdf.process.taught_paths import contact_points
+from nrdf.process.strategy import strategy_of
 from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
 from nrdf.reports.html import write_transfer_html
+from nrdf.reports.job_meshes import write_job_meshes
 from nrdf.reports.transfer_report import transfer_report
 from nrdf.toolpath.file import write_toolpaths
+from nrdf.toolpath.tool_segments import contact_points
 from nrdf.toolpath.types import Job
 from nrdf.viz.picture import Panel, draw_regions, render_details
 
@@ -62,8 +65,9 @@ def write_job_files(
 ) -> dict[str, Any]:
     """Write a transfer into an existing folder; what its report.json says.
 
-    knowledge.yaml, target.ply (in metres, in the target's own frame), regions/, toolpaths.json
-    (for `nrdf export`), report.json, report.html and picture.png. `title` names the target,
+    knowledge.yaml, target.ply (in metres, in the target's own frame), regions/ (their points),
+    surface.ply and region_meshes/ (`nrdf.reports.job_meshes`), toolpaths.json (for `nrdf export`),
+    report.json, report.html and picture.png. `title` names the target,
     `origin` (command, model, versions, ...) is added to the report. Without any tool path there is
     neither knowledge.yaml nor toolpaths.json. Raises OutputError if something cannot be written.
     """
@@ -72,6 +76,9 @@ def write_job_files(
     (folder / REGIONS).mkdir()
     found = {n: r.match for n, r in result.regions.items() if not r.missing}
     write_matches(folder / REGIONS, target, found)
+    if result.surface is not None:
+        meshes = {n: r.mesh for n, r in result.regions.items() if r.mesh is not None}
+        write_job_meshes(folder, result.surface, meshes, target.frame)
     job = job_of(result)
     if job.paths:
         write_toolpaths(folder, job)
@@ -80,7 +87,7 @@ def write_job_files(
     panel = panel_of(result, title)
     with ThreadPoolExecutor(2) as pool:
         whole = pool.submit(draw_regions, [panel], folder / PICTURE, _WHOLE)
-        details = pool.submit(render_details, panel, list(panel.regions), _DETAIL).result()
+        details = pool.submit(render_details, panel, panel.names, _DETAIL).result()
         whole.result()
     seconds = {**result.seconds, "pictures": time.perf_counter() - start}
     report = {"title": title, **transfer_report(result, limits), **origin}
@@ -104,19 +111,25 @@ def job_of(result: TransferResult) -> Job:
 
 
 def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
-    """The target, upright, with its regions and the lines of its tool paths, for a picture."""
+    """The target's mesh, upright, with its regions' and the lines of its tool paths, for a picture;
+    the target's points where it has no mesh."""
     turn = np.eye(3) if result.pose is None else result.pose.rotation
-    regions = {n: r.match.indices for n, r in result.regions.items() if not r.missing}
     lines: dict[str, list[np.ndarray]] = {}
     for step in result.paths:
         if step.path is not None:
             work = [s for s in step.path.segments if s.kind == "process"]
-            height = step.process.standoff_m
-            drawn = [contact_points(s.positions, s.quaternions_xyzw, height) for s in work]
-            lines.setdefault(step.region, []).extend(line @ turn for line in drawn)
+            strategy = strategy_of(step.process)
+            drawn = lines.setdefault(step.region, [])
+            drawn.extend(contact_points(segment, strategy) @ turn for segment in work)
+    if result.surface is not None:
+        found = {n: r.mesh.mesh for n, r in result.regions.items() if r.mesh is not None}
+        regions = {name: Mesh(mesh.vertices @ turn, mesh.faces) for name, mesh in found.items()}
+        surface = Mesh(result.surface.vertices @ turn, result.surface.faces)
+        return Panel.of_mesh(title, surface, regions, lines, note=note)
+    points = {n: r.match.indices for n, r in result.regions.items() if not r.missing}
     target = result.target
     normals = None if target.normals is None else target.normals @ turn
-    return Panel(title, target.points @ turn, normals, regions, note, lines)
+    return Panel(title, target.points @ turn, normals, points, note, lines)
 
 
 def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:

@@ -11,13 +11,14 @@ from nrdf.process.limits import Limits, strict_warnings
 from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
 from nrdf.process.transfer_result import PathResult, TransferResult
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.region_samples import REASONS
 
 METRIC_COLUMNS = (
     "worked · left out · unreached", "overlap", "line spacing, mean · worst",
     "largest step · turn · turn by mm", "off the object, 95 % · worst",
-    "off the planned surface, 99 % · worst", "axis off, 99 %", "length", "time",
+    "off the mesh planned on, 99 % · worst", "axis off, 99 %", "length", "time",
 )  # fmt: skip
 SHORT_METRIC_COLUMNS = (
     "worked, %", "left out, %", "missed, %", "lines, mm", "step, mm", "turn, °", "off, mm",
@@ -46,6 +47,7 @@ def transfer_report(result: TransferResult, limits: Limits) -> dict[str, Any]:
         "unit": "m",
         "frame": result.target.frame,
         "pose": pose_to_dict(result.pose),
+        "surface": _surface(result.surface),
         "regions": _regions(result),
         "paths": paths,
         "total": {
@@ -65,6 +67,17 @@ def transfer_report(result: TransferResult, limits: Limits) -> dict[str, Any]:
     }
 
 
+def _surface(mesh: TargetMesh | None) -> dict[str, Any] | None:
+    """The mesh that paths are planned on."""
+    if mesh is None:
+        return None
+    return {
+        "faces": len(mesh.faces),
+        "edge_length_m": round(mesh.edge_length, 6),
+        "repairs": list(mesh.repairs),
+    }
+
+
 def _regions(result: TransferResult) -> dict[str, Any]:
     reference, target = result.bound_knowledge, result.target
     regions = {}
@@ -79,6 +92,8 @@ def _regions(result: TransferResult) -> dict[str, Any]:
             "share_of_reference": round(
                 len(reference.regions[name]) / len(reference.cloud), 5
             ),
+            "area_m2": None if region.mesh is None else round(region.mesh.area_m2, 6),
+            "changes": [] if region.mesh is None else list(region.mesh.changes),
         }  # fmt: skip
     return regions
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,30 +11,25 @@ from scipy.spatial import cKDTree
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
 from nrdf.geometry.quadrics import quadrics
-from nrdf.geometry.sampling import distinct_points, downsample
 
-MOST_POINTS = 30_000
-"""A larger cloud is thinned evenly: finer points than a tool can follow only cost time."""
 SAME_SIDE = 0.5
 """Least cosine between the normals of points that may belong to one sheet."""
 _LEVEL = 0.7  # the same for points that one quadric is fitted to
 _NEIGHBOURS, _ASKED = 10, 24  # of one sheet, out of all
 _FITTED, _LEAST = 20, 4
 _SURE = 0.5  # share of one of fewer points that are a plane, as at the end of a thin part
-_SHEETS, _OTHER = 6, 0.94  # normals to start from, and the cosine between two that differ
 _COINCIDENT = 1e-4  # spacings within which two points are in one place
 _AT_ONCE = 8192  # places: what is known of each takes many times its own memory
 _ROUNDS, _WHOLE, _SETTLED = 16, 2, 1e-2  # until nothing moves by more, in spacings or rad
 
 
 class Surface:
-    """An object's points with outward normals, as a surface to work on.
+    """An object's points with outward normals, as a surface that other points are mapped to.
 
     points: (n, 3), m; normals: (n, 3), brought to unit length, outward. The two sides of a thin
-    part are distinguished by their normals alone. There is one row for each point given, so a
-    region is an array of indices of the points given; none of them should repeat another one
-    (`surface_subset`). found: what other modules have found out about the surface, for their next
-    call. Raises ProcessError if the two do not fit each other, are not finite, or are fewer than 8.
+    part are distinguished by their normals alone. There is one row for each point given; none
+    should repeat another one. Raises ProcessError if the two do not fit each other, are not finite,
+    or are fewer than 8.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray) -> None:
@@ -51,22 +45,6 @@ class Surface:
             )
         self.points = points
         self.normals = unit_vectors(normals)
-        self.found: dict[Any, Any] = {}
-
-    def check_region(self, region: np.ndarray) -> np.ndarray:
-        """A region's indices (k,) of `points`, ascending, each once.
-
-        Raises ProcessError if it is empty or does not fit the surface.
-        """
-        region = np.unique(np.asarray(region))
-        if region.size == 0 or not np.issubdtype(region.dtype, np.integer):
-            raise ProcessError("a region must be the indices of one or more of the cloud's points")
-        if region[0] < 0 or region[-1] >= len(self.points):
-            raise ProcessError(
-                f"a region has indices {region[0]} to {region[-1]}; the cloud's are 0 to "
-                f"{len(self.points) - 1}"
-            )
-        return region
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -84,7 +62,7 @@ class Surface:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        """LineNeighbours (e, 2) on one sheet, each pair once, the lower index first.
+        """Neighbours (e, 2) on one sheet, each pair once, the lower index first.
 
         Pairs that rise out of each other's tangent plane, or whose normals differ much, are left
         out, so that no edge leads through a thin part.
@@ -103,12 +81,6 @@ class Surface:
         code = np.unique(pair[:, 0] * len(self.points) + pair[:, 1])
         return np.stack(np.divmod(code, len(self.points)), axis=1)
 
-    @cached_property
-    def turns(self) -> np.ndarray:
-        """Cosine (e,) between the normals of each edge's ends."""
-        i, j = self.edges.T
-        return np.einsum("ea,ea->e", self.normals[i], self.normals[j])
-
     def project(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nearest places on the smooth surface, and its normals there, each (m, 3).
 
@@ -117,42 +89,6 @@ class Surface:
         side (Alexa et al., 2003). A point with no surface of its side around stays where it is.
         """
         return self._settled(points, normals)[:2]
-
-    def nearest(
-        self, points: np.ndarray, normals: np.ndarray, near_enough: float = 0.02
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The nearest places on the smooth surface that faces normals (m, 3), and how far they are.
-
-        Returns places (m, 3), the surface's normals there (m, 3), distances (m,), m. As `project`,
-        but at an edge there are several sheets, each found from a normal of its own, of which the
-        nearest counts; one at less than `near_enough` spacings is taken at once. Where
-        there is no surface around, the distance is infinite.
-        """
-        points, normals = np.asarray(points, dtype=np.float64), unit_vectors(normals)
-        places, outward, best = self._found(points, normals)
-        # What is not near enough tries the normals around, those that differ.
-        poor = np.flatnonzero(best > near_enough * self.spacing)
-        around = self.normals[self._nearest_to(points[poor], _SHEETS)]
-        starts = np.concatenate([normals[poor, None], around], axis=1)
-        cosine = np.einsum("mka,mla->mkl", starts, starts)
-        earlier = np.tril(np.ones(cosine.shape[1:], bool), -1)
-        new = (cosine[:, :, 0] > 0.2) & ((cosine < _OTHER) | ~earlier).all(axis=2)
-        new[:, 0] = False
-        which, start = np.nonzero(new)
-        found, turned, off = self._found(points[poor[which]], starts[which, start])
-        order = np.lexsort((off, which))
-        which, first = np.unique(which[order], return_index=True)
-        closer = off[order][first] < best[poor[which]]
-        into, chosen = poor[which[closer]], order[first[closer]]
-        places[into], outward[into], best[into] = found[chosen], turned[chosen], off[chosen]
-        return places, outward, best
-
-    def _found(
-        self, points: np.ndarray, normals: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places and normals as of `project`, and how far they are: infinitely without surface."""
-        found, turned, fitted = self._settled(points, normals)
-        return found, turned, np.where(fitted, np.linalg.norm(found - points, axis=1), np.inf)
 
     def _settled(
         self, points: np.ndarray, normals: np.ndarray
@@ -266,16 +202,6 @@ class Surface:
         rise = np.abs((offset @ normals[:, :, None])[..., 0]) / self.spacing
         level = np.clip(3.0 + 1.5 * distance / self.spacing - 2.5 * rise, 0.0, 1.0)
         return distance, np.where(facing > SAME_SIDE, facing * level, 0.0)
-
-
-def surface_subset(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Indices (k,), ascending, of the points (n, 3) of a whole cloud that a surface is made of.
-
-    Points that repeat another one are left out, and very many are thinned to `MOST_POINTS`.
-    """
-    distinct = distinct_points(points, normals)
-    kept = downsample(points[distinct], MOST_POINTS, np.random.default_rng(0))
-    return np.asarray(distinct[kept])
 
 
 def typical_spacing(distance: np.ndarray, number: int) -> float:

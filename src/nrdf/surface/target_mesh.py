@@ -47,6 +47,15 @@ class TargetMesh:
     repairs: tuple[str, ...] = ()
     _found: dict[Any, Any] = field(default_factory=dict, repr=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For other processes: search trees stay here, and are built anew there."""
+        return {
+            "vertices": self.vertices,
+            "faces": self.faces,
+            "repairs": self.repairs,
+            "_found": {},
+        }
+
     @staticmethod
     def from_mesh(mesh: Mesh) -> TargetMesh:
         """The outer skin of a mesh in metres, at its own resolution.

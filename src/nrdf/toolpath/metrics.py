@@ -9,54 +9,20 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
-from nrdf.geometry.polylines import step_lengths, total_length
-from nrdf.surface.accessibility import accessible_points
+from nrdf.geometry.frames import angles_between
+from nrdf.geometry.polylines import arc_length, step_lengths, total_length
 from nrdf.surface.given_surface import GivenSurface
-from nrdf.surface.patch import Patch, inside_margin, patches_of
-from nrdf.surface.surface import Surface
+from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
-from nrdf.toolpath.region_samples import MARGIN, NO_CLEARANCE, Coverage
-from nrdf.toolpath.sampled_path import SampledPath, line_spacing
+from nrdf.toolpath.line_spacing import line_spacing
+from nrdf.toolpath.region_samples import RegionSamples
+from nrdf.toolpath.sampled_path import SampledPath
 from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.tool_segments import contact_points
 from nrdf.toolpath.types import Segment
 
 _SHORTEST_M = 1e-3
 _COMPARED_M = 0.003  # between the places that are compared with the object as given
-
-
-@dataclass(frozen=True)
-class RegionPoints:
-    """Which of a region's points a strategy works.
-
-    points: (k,) indices of the surface's points, all of the region. accessible: (k,) whether the
-    tool has its clearance there. inside_margin: (k,) whether a point is not in the edge margin.
-    patches: of the accessible points.
-    """
-
-    points: np.ndarray
-    accessible: np.ndarray
-    inside_margin: np.ndarray
-    patches: tuple[Patch, ...]
-
-    @staticmethod
-    def of(
-        surface: Surface, region: np.ndarray, clearance_m: float, edge_margin_m: float
-    ) -> RegionPoints:
-        """region: indices (k,) of the surface's points. Raises ProcessError as planning does."""
-        points = surface.check_region(region)
-        accessible = accessible_points(surface, region, clearance_m)
-        patches = patches_of(surface, accessible)
-        inside = inside_margin(surface, accessible, patches, edge_margin_m)
-        free = np.isin(points, accessible)
-        return RegionPoints(points, free, np.isin(points, inside), patches)
-
-    def coverage(self, reached: np.ndarray) -> Coverage:
-        """The shares, where a footprint reaches (k,) of the points."""
-        free, missed = self.accessible, self.accessible & ~reached
-        worked, margin = free & reached, missed & ~self.inside_margin
-        left_out = {NO_CLEARANCE: float((~free).mean()), MARGIN: float(margin.mean())}
-        missed = missed & self.inside_margin
-        return Coverage(float(worked.mean()), left_out, float(missed.mean()))
 
 
 @dataclass(frozen=True)
@@ -68,11 +34,11 @@ class ToolPathMetrics:
     line_spacing_*: between neighbouring lines, along the surface; None where no line has a
     neighbour.
 
-    surface_distance_*: of the process waypoints from the smooth surface that they were planned on,
-    at the stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on
-    the surface that are worked, along the lines and between waypoints too, from the object as it
-    was given (`nrdf.surface.given_surface`), which compared_with names; distances below
-    resolution_m mean nothing. None where it is not known.
+    surface_distance_*: of the process waypoints from the mesh that they were planned on, at the
+    stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on the
+    surface that are worked, along the lines and between waypoints too, from the object as it was
+    given (`nrdf.surface.given_surface`), which compared_with names; distances below resolution_m
+    mean nothing. None where it is not known. What runs off beyond a line's ends is in neither.
 
     axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
     step_worst_m, turn_worst_rad, bend_worst_rad_m: the largest step between neighbouring waypoints
@@ -107,38 +73,34 @@ class ToolPathMetrics:
 
 
 def measure_path(
-    surface: Surface,
-    region: np.ndarray,
+    region: RegionMesh,
     strategy: Strategy,
     segments: Sequence[Segment],
     given: GivenSurface | None = None,
 ) -> ToolPathMetrics:
-    """Metrics of `segments` on `region`, indices (k,) of the surface's points.
+    """Metrics of `segments` on a region of an object's mesh.
 
-    The region's points, each of which stands for the same area, tell what is covered. given: the
+    Samples of the region, each of which stands for the same area, tell what is covered. given: the
     object itself, which the path is compared with. Raises ProcessError where there is no process
     segment.
     """
     work = [segment for segment in segments if segment.kind == "process"]
     if not work:
         raise ProcessError("a tool path without a process segment cannot be measured")
-    region_points = RegionPoints.of(surface, region, strategy.clearance_m, strategy.edge_margin_m)
+    samples = RegionSamples.of(region, strategy)
     axes = [segment.axes for segment in work]
-    contacts = [
-        s.positions + strategy.standoff_m * axis for s, axis in zip(work, axes, strict=True)
-    ]
+    contacts = [contact_points(segment, strategy) for segment in work]
     once = len(work) // strategy.passes if len(work) % strategy.passes == 0 else len(work)
     sampled = SampledPath.along(
         contacts[:once], axes[:once], strategy.tool_radius_m / 4.0, 0.5 * strategy.stepover_m
     )
-    points, normals = surface.points[region_points.points], surface.normals[region_points.points]
-    counts = sampled.coverage_count(points, normals, strategy.tool_radius_m)
-    worked = counts[(counts > 0) & region_points.accessible]
-    spacing = line_spacing(region_points.patches, sampled, strategy.stepover_m).distance
-    off, wrong = _fit(surface, strategy, work, contacts)
+    counts = sampled.coverage_count(samples.points, samples.normals, strategy.tool_radius_m)
+    worked = counts[(counts > 0) & samples.accessible]
+    spacing = line_spacing(region.mesh, sampled, strategy.stepover_m)
+    off, wrong = _fit(region, strategy, work, contacts)
     step, turn, bend = _jumps(work, contacts, axes)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
-    shares = region_points.coverage(counts > 0)
+    shares = samples.coverage(counts > 0)
     made = ToolPathMetrics(
         coverage=shares.worked,
         left_out=shares.left_out,
@@ -158,7 +120,12 @@ def measure_path(
     )
     if given is None:
         return made
-    fine = SampledPath.along(contacts[:once], axes[:once], _COMPARED_M, 0.0)
+    inner = [_without_run_off(line, strategy.run_off_m) for line in contacts[:once]]
+    fine = SampledPath.along(
+        [line[own] for line, own in zip(contacts, inner, strict=False)],
+        [axis[own] for axis, own in zip(axes, inner, strict=False)],
+        _COMPARED_M, 0.0,
+    )  # fmt: skip
     away = given.distance(fine.places, fine.axes)
     return replace(
         made,
@@ -188,32 +155,42 @@ def _jumps(
     return step, turn, bend
 
 
+def _without_run_off(contacts: np.ndarray, run_off_m: float) -> slice:
+    """The part of a line (n, 3) that is not beyond the region's border by design."""
+    if run_off_m <= 0.0:
+        return slice(None)
+    along = arc_length(contacts)
+    inner = np.flatnonzero((along > run_off_m) & (along < along[-1] - run_off_m))
+    return slice(inner[0], inner[-1] + 1) if len(inner) > 1 else slice(None)
+
+
 def _fit(
-    surface: Surface,
+    region: RegionMesh,
     strategy: Strategy,
     work: Sequence[Segment],
     contacts: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of every waypoint, the distance (n,), m, from the smooth surface that faces the tool, and
-    the angle (n,), rad, between tool z and what the strategy asks for on smooth normals."""
-    everywhere = np.concatenate(contacts)
-    held = Rotation.from_quat(np.concatenate([segment.quaternions_xyzw for segment in work]))
+    """Of every waypoint, the distance (n,), m, from the mesh that faces the tool, and the angle
+    (n,), rad, between tool z and what the strategy asks for on smooth normals."""
     tilt = tilt_rotation(strategy.lead_rad, strategy.tilt_rad)
+    inner = [_without_run_off(line, strategy.run_off_m) for line in contacts]
+    lines = [line[own] for line, own in zip(contacts, inner, strict=True)]
+    held = Rotation.from_quat(
+        np.concatenate([s.quaternions_xyzw[own] for s, own in zip(work, inner, strict=True)])
+    )
     tails = -(held * tilt.inv()).as_matrix()[:, :, 2]
-    _, _, off = surface.nearest(everywhere, tails)
-    off = np.minimum(off, surface.tree.query(everywhere)[0])  # the cloud, where it is no surface
-    smooth = surface.smooth_normals(everywhere, tails, strategy.tool_radius_m)
+    nearest = region.parent.nearest(np.concatenate(lines), tails)
+    smooth = region.parent.smooth_normals(nearest.points, nearest.faces, strategy.tool_radius_m)
     planned = []
-    cuts = np.cumsum([len(line) for line in contacts])[:-1]
-    for line, normals in zip(contacts, np.split(smooth, cuts), strict=True):
+    cuts = np.cumsum([len(line) for line in lines])[:-1]
+    for line, normals in zip(lines, np.split(smooth, cuts), strict=True):
         # A waypoint alone has no travel; for a tool that is not tilted, any will do.
         travel = (
             travel_directions(line, 0.5 * strategy.stepover_m) if len(line) > 1 else np.ones((1, 3))
         )
         planned.append(surface_frames(travel, normals))
     axes = (Rotation.from_matrix(np.concatenate(planned)) * tilt).as_matrix()[:, :, 2]
-    cosine = np.einsum("na,na->n", axes, held.as_matrix()[:, :, 2])
-    return off, np.arccos(np.clip(cosine, -1.0, 1.0))
+    return nearest.distances, angles_between(axes, held.as_matrix()[:, :, 2])
 
 
 def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float, float]:

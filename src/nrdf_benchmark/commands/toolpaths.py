@@ -9,6 +9,7 @@ from nrdf.commands.console import command_line, console, progress_bar, show, tab
 from nrdf.commands.options import Folder, Metavar
 from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count, NonNegative, NonNegativeCount
+from nrdf.toolpath.strategy import Trajectory
 
 
 @lock_output("out")
@@ -16,10 +17,10 @@ def toolpaths(
     category: Literal["chair", "car", "plane", "table"] | None = None,
     data: Folder | None = None,
     members: NonNegativeCount = 10,
-    trajectory: Literal["raster", "cross-hatch", "spiral", "contour"] = "raster",
+    trajectory: Trajectory = "raster",
     edge_margin_mm: NonNegative = 0.0,
     meshes: tuple[Annotated[Path, Metavar("FOLDER")], ...] = (),
-    planner: str = "points",
+    planner: str = "raster",
     surface: Literal["mesh", "votes", "scan"] = "mesh",
     sample: Count | None = None,
     out: Folder | None = None,
@@ -43,11 +44,11 @@ def toolpaths(
         category: chair, car, plane or table; or give --meshes.
         data: BSRC's folder, with Chair, Car and plane in it.
         members: Members of the parametric family.
-        trajectory: raster, cross-hatch, spiral or contour.
+        trajectory: A planner's name in nrdf.toolpath.planners; not for --meshes.
         edge_margin_mm: Margin along the regions' borders; not for --meshes.
         meshes: Folders of meshes, or mesh files.
-        planner: "points", which transfer uses, or a planner's name in nrdf.toolpath.planners.
-        surface: What the planners of nrdf.toolpath.planners plan on: the mesh with its own faces as
+        planner: With --meshes, a planner's name in nrdf.toolpath.planners.
+        surface: What is planned on: the mesh with its own faces as
             regions; "votes": the mesh, regions by votes of points as in retrieval; "scan": a mesh
             made of a simulated scan of three views, 200,000 points with noise of 1 mm.
         sample: Only so many meshes of each folder, evenly chosen.
@@ -55,7 +56,7 @@ def toolpaths(
         overwrite: Start anew, whatever is in the folder.
     """
     if meshes:
-        _on_meshes(meshes, planner, surface, sample, trajectory, out, overwrite)
+        _on_meshes(meshes, planner, surface, sample, out, overwrite)
         return
     if category is None:
         from nrdf.errors import DataError
@@ -100,7 +101,6 @@ def _on_meshes(
     planner: str,
     surface: Literal["mesh", "votes", "scan"],
     sample: int | None,
-    trajectory: str,
     out: Path | None,
     overwrite: bool,
 ) -> None:
@@ -118,8 +118,8 @@ def _on_meshes(
     sources = target_sources(meshes, sample)
     cache = None if out is None else LineCache(out, overwrite)
     with progress_bar(f"meshes, {planner}") as progress:
-        results = evaluate_mesh_paths(sources, planner, cache, progress, trajectory, surface)
-    title = f"Tool paths on {len(sources)} meshes, planner {planner}, {trajectory}"
+        results = evaluate_mesh_paths(sources, planner, cache, progress, surface)
+    title = f"Tool paths on {len(sources)} meshes, planner {planner}"
     if surface != "mesh":
         title += f", on {surface}"
     for what, chosen in selections(results):

@@ -6,17 +6,11 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
 from nrdf.errors import DataError, NrdfError, unknown_name
-from nrdf.field.cloud_encoder import WORKING_POINTS
-from nrdf.geometry.sampling import downsample, indices_in_subset
-from nrdf.surface.surface import Surface
 from nrdf.toolpath.mesh_planner import plan_on_mesh
-from nrdf.toolpath.planner import plan
 from nrdf.toolpath.planners import PLANNERS
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
@@ -25,8 +19,6 @@ from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, TargetSource
 from nrdf_benchmark.result_cache import LineCache, code_checksum
 
-TODAY = "points"
-"""The planner on at most 16,384 points of the surface, which `nrdf transfer` uses."""
 SOURCES = (
     "nrdf/geometry", "nrdf/surface", "nrdf/toolpath", "nrdf_benchmark/mesh_paths",
     "nrdf_benchmark/objects/dataset.py",
@@ -50,35 +42,29 @@ class MeshPathResult:
 RegionPlanner = Callable[[str], tuple[Segment, ...]]
 
 
-def planner_names() -> tuple[str, ...]:
-    """Today's planner, and those of `nrdf.toolpath.planners` that there are."""
-    return (TODAY, *PLANNERS)
-
-
 def evaluate_mesh_paths(
     sources: Sequence[TargetSource],
-    planner: str = TODAY,
+    planner: str = "raster",
     cache: LineCache | None = None,
     progress: Callable[[int, int], None] | None = None,
-    trajectory: str | None = None,
     surface: SurfaceKind = "mesh",
 ) -> list[MeshPathResult]:
     """Plan and measure on every region; meshes that `cache` has are not planned on again.
 
-    trajectory: of today's planner, "raster" unless given. surface: what the others plan on.
+    planner: a name in `nrdf.toolpath.planners.PLANNERS`. surface: what it plans on.
     `progress` is told (done, all). Raises DataError for a planner that there is not, or a mesh that
     cannot be used.
     """
-    if planner not in planner_names():
-        raise DataError(unknown_name("planner", planner, planner_names()))
-    marks = {_fingerprint(source, planner, trajectory, surface): source.name for source in sources}
+    if planner not in PLANNERS:
+        raise DataError(unknown_name("planner", planner, list(PLANNERS)))
+    marks = {_fingerprint(source, planner, surface): source.name for source in sources}
     file = f"toolpaths-{planner}-{surface}.jsonl"
     lines = cache.read(file, marks) if cache else {}
     results = []
     for number, (mark, source) in enumerate(zip(marks, sources, strict=True)):
         found = _parse(lines.get(source.name))
         if found is None:
-            found = _evaluate(source.read(), planner, trajectory, surface)
+            found = _evaluate(source.read(), planner, surface)
             if cache:
                 cache.append(file, mark, {"results": [asdict(result) for result in found]})
         results += found
@@ -87,17 +73,10 @@ def evaluate_mesh_paths(
     return results
 
 
-def _evaluate(
-    target: MeshTarget, planner: str, trajectory: str | None, surface: SurfaceKind
-) -> list[MeshPathResult]:
+def _evaluate(target: MeshTarget, planner: str, surface: SurfaceKind) -> list[MeshPathResult]:
     strategy = target.strategy
-    if trajectory is not None:
-        strategy = replace(strategy, trajectory=trajectory)  # type: ignore[arg-type]
     start = time.process_time()
-    if planner == TODAY:
-        make = _today(target, strategy)
-    else:
-        make = _on_mesh(target, planner, strategy, surface)
+    make = _on_mesh(target, planner, strategy, surface)
     shared = (time.process_time() - start) / max(len(target.visible_regions), 1)
     results = []
     for region in target.visible_regions:
@@ -116,19 +95,6 @@ def _evaluate(
     return results
 
 
-def _today(target: MeshTarget, strategy: Strategy) -> RegionPlanner:
-    """As `nrdf transfer` does: on evenly thinned points of the skin."""
-    skin = target.skin
-    kept = downsample(skin.points, WORKING_POINTS, np.random.default_rng(0))
-    surface = Surface(skin.points[kept], skin.normals[kept])
-
-    def make(region: str) -> tuple[Segment, ...]:
-        chosen = indices_in_subset(kept, target.indices(region), len(skin.points))
-        return plan(surface, chosen, strategy)
-
-    return make
-
-
 def _on_mesh(
     target: MeshTarget, planner: str, strategy: Strategy, surface: SurfaceKind
 ) -> RegionPlanner:
@@ -141,10 +107,8 @@ def _on_mesh(
     return make
 
 
-def _fingerprint(
-    source: TargetSource, planner: str, trajectory: str | None, surface: SurfaceKind
-) -> str:
-    parts = [source.name, source.checksum, planner, trajectory, surface, code_checksum(SOURCES)]
+def _fingerprint(source: TargetSource, planner: str, surface: SurfaceKind) -> str:
+    parts = [source.name, source.checksum, planner, surface, code_checksum(SOURCES)]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
 

@@ -7,7 +7,7 @@ import pytest
 from builders.mesh_targets import plate_target, rows_on_top
 from nrdf.errors import DataError, ProcessError
 from nrdf_benchmark.mesh_paths import evaluate
-from nrdf_benchmark.mesh_paths.evaluate import TODAY, evaluate_mesh_paths, planner_names
+from nrdf_benchmark.mesh_paths.evaluate import evaluate_mesh_paths
 from nrdf_benchmark.mesh_paths.targets import TargetSource
 from nrdf_benchmark.result_cache import LineCache
 
@@ -22,17 +22,17 @@ def planned(monkeypatch):
     """Rows instead of a plan; the regions that were planned on."""
     asked = []
 
-    def make(target, strategy):
+    def make(target, planner, strategy, surface):
         return lambda region: asked.append(region) or rows_on_top([-0.05, -0.025, 0.0])
 
-    monkeypatch.setattr(evaluate, "_today", make)
+    monkeypatch.setattr(evaluate, "_on_mesh", make)
     return asked
 
 
 def test_a_plate_is_planned_and_measured(source):
     (result,) = evaluate_mesh_paths([source])
-    assert (result.planner, result.target, result.region) == (TODAY, "block", "top")
-    assert result.metrics.coverage > 0.99 and result.metrics.distance_99_m < 4e-3
+    assert (result.planner, result.target, result.region) == ("raster", "block", "top")
+    assert result.metrics.coverage > 0.99 and result.metrics.distance_worst_m < 1e-6
     assert result.seconds > 0.0 and not result.error
 
 
@@ -49,23 +49,22 @@ def test_meshes_that_were_done_are_not_planned_again(source, planned, tmp_path):
 
 
 def test_a_region_that_cannot_be_planned_has_its_reason(source, monkeypatch):
-    def make(target, strategy):
+    def make(target, planner, strategy, surface):
         def fail(region):
             raise ProcessError("stepover_m is 9")
 
         return fail
 
-    monkeypatch.setattr(evaluate, "_today", make)
+    monkeypatch.setattr(evaluate, "_on_mesh", make)
     (result,) = evaluate_mesh_paths([source])
     assert result.metrics is None and result.error == "stepover_m is 9"
 
 
 def test_planners_are_told_by_name(source):
-    with pytest.raises(DataError, match="points"):
+    with pytest.raises(DataError, match="raster"):
         evaluate_mesh_paths([source], "rastre")
-    assert planner_names()[:2] == (TODAY, "raster")
-    (result,) = evaluate_mesh_paths([source], "raster")
-    assert result.planner == "raster" and not result.error
+    (result,) = evaluate_mesh_paths([source], "plane-slices")
+    assert result.planner == "plane-slices" and not result.error
     assert result.metrics.distance_worst_m < 1e-6 and result.metrics.coverage > 0.99
     assert result.metrics.step_worst <= 2.0
     assert result.metrics.strokes == 1  # joined on the surface

@@ -19,7 +19,7 @@ from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.check import CheckedProcess, check_process
-from nrdf.process.taught_paths import contact_points
+from nrdf.process.strategy import strategy_of
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
@@ -28,6 +28,7 @@ from nrdf.studio.model.paintable_cloud import PaintableCloud
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of
 from nrdf.studio.model.uploads import read_upload
 from nrdf.studio.model.worker import Progress
+from nrdf.toolpath.tool_segments import contact_points
 
 if TYPE_CHECKING:
     from nrdf.field.encoded_cloud import EncodedCloud
@@ -55,12 +56,9 @@ class Plan:
         """The contact points (m, 3) of each line, on the surface, m."""
         if self.checked is None:
             return []
-        height = self.checked.process.standoff_m
-        return [
-            contact_points(s.positions, s.quaternions_xyzw, height)
-            for s in self.checked.segments
-            if s.kind == "process"
-        ]
+        strategy = strategy_of(self.checked.process)
+        work = (segment for segment in self.checked.segments if segment.kind == "process")
+        return [contact_points(segment, strategy) for segment in work]
 
 
 @dataclass(frozen=True)
@@ -135,8 +133,11 @@ class LocalComputing:
         except ProcessError as error:
             return Plan(str(error))
         paintable = self._paintable(reference)
-        indices = np.flatnonzero(region.mask)
-        checked = check_process(paintable.surface, region.name, indices, process, paintable.given)
+        try:
+            mesh = paintable.region(region.mask, process.tool.radius_m)
+        except ProcessError as error:
+            return Plan(f"region '{region.name}': {error}")
+        checked = check_process(mesh, region.name, process, paintable.given)
         return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
 
     def prepare(self, revision: int, clouds: Path, document: Document, progress: Progress) -> None:

@@ -14,7 +14,10 @@ from nrdf.geometry.sampling import distinct_points, downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.studio.model.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
+from nrdf.surface.object_mesh import object_mesh
+from nrdf.surface.region_mesh import RegionMesh, region_mesh
 from nrdf.surface.surface import Surface
+from nrdf.surface.target_mesh import TargetMesh
 
 
 class PaintableCloud:
@@ -33,6 +36,7 @@ class PaintableCloud:
         given = cloud.normals
         self.normals = estimate_normals(self.points) if given is None else given[self.shown]
         self.surface = Surface(self.points, self.normals)
+        self._meshes: dict[float, TargetMesh] = {}
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
 
     @property
@@ -48,10 +52,24 @@ class PaintableCloud:
     @cached_property
     def given(self) -> GivenSurface:
         """The object as it was given, to measure tool paths against."""
+        return given_surface(self._with_normals)
+
+    def region(self, mask: np.ndarray, tool_radius_m: float) -> RegionMesh:
+        """A mask of the shown points (k,) as a part of the object's mesh, for a tool.
+
+        Raises ProcessError where no mesh can be made, or nothing of the region is left on it.
+        """
+        if tool_radius_m not in self._meshes:
+            self._meshes = {tool_radius_m: object_mesh(self._with_normals, tool_radius_m)}
+        mesh = self._meshes[tool_radius_m]
+        return region_mesh(mesh, self.points, self.normals, mask.astype(float), tool_radius_m)
+
+    @cached_property
+    def _with_normals(self) -> PointCloud:
         normals = (
             self.normals[self._nearest_shown] if self.cloud.normals is None else self.cloud.normals
         )
-        return given_surface(replace(self.cloud, normals=normals))
+        return replace(self.cloud, normals=normals)
 
     @cached_property
     def _nearest_shown(self) -> np.ndarray:

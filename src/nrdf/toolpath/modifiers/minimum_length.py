@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.polylines import total_length
 from nrdf.toolpath.surface_path import SurfacePath
 
 _ALIKE = 0.5  # cosine between the normals of a point and of a path on its side
@@ -30,7 +29,7 @@ def minimum_length(
     than the share `lost` would go with all that go. The shortest are looked at first. droppable:
     which of the paths (k,) may go; all, unless given.
     """
-    lengths = np.array([total_length(path.contacts) for path in paths])
+    lengths = np.array([path.length_m for path in paths])
     may_go = lengths < least_m if droppable is None else (lengths < least_m) & droppable
     short = [int(k) for k in np.argsort(lengths, kind="stable") if may_go[k]]
     if not short:

@@ -35,7 +35,7 @@ def cut(path: SurfacePath, after: np.ndarray) -> list[SurfacePath]:
     if not after.any():
         return [path]
     runs = np.split(np.arange(len(path.contacts)), np.flatnonzero(after) + 1)
-    return [SurfacePath(path.contacts[run], path.normals[run]) for run in runs if len(run) > 1]
+    return [path.part(run) for run in runs if len(run) > 1]
 
 
 def turns(directions: np.ndarray) -> np.ndarray:

@@ -56,8 +56,7 @@ def snake_order(
 def started_near(path: SurfacePath, place: np.ndarray) -> SurfacePath:
     """A closed path from its contact nearest to a place (3,)."""
     first = int(np.argmin(np.linalg.norm(path.contacts[:-1] - place, axis=1)))
-    turn = np.append(np.roll(np.arange(len(path.contacts) - 1), -first), first)
-    return SurfacePath(path.contacts[turn], path.normals[turn], True)
+    return path.from_contact(first)
 
 
 def _start(path: SurfacePath, turned: bool, place: np.ndarray) -> np.ndarray:

@@ -1,0 +1,119 @@
+"""Every process of a knowledge on a target: planned anew on its regions, or warped to them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.geometry.polylines import longest_step
+from nrdf.geometry.units import readable
+from nrdf.process.correspondence import Correspondence
+from nrdf.process.process import Process, TaughtSegment
+from nrdf.process.reference_paths import ReferencePaths
+from nrdf.process.strategy import strategy_of, tool_path
+from nrdf.process.transfer_result import FoundRegion, PathResult
+from nrdf.process.warp import warp_segments
+from nrdf.surface.given_surface import GivenSurface
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.mesh_planner import plan_on_mesh
+from nrdf.toolpath.mesh_projection import on_mesh
+from nrdf.toolpath.metrics import measure_path
+from nrdf.toolpath.tool_segments import add_approach_retract
+from nrdf.toolpath.types import Segment
+
+Step = tuple[str, int, Process]
+"""A region's name, the number of a process there, and the process."""
+_LONGER = 2.0  # times the longest step on the reference, from which a warped one is reported
+_THREADS = 4  # that plan: numpy leaves them little to do at once
+
+
+@dataclass(frozen=True)
+class TargetPaths:
+    """What all paths on one target share.
+
+    given: the target as it was given, which paths are compared with.
+    """
+
+    reference: ReferencePaths
+    correspondence: Correspondence
+    given: GivenSurface
+
+    def all(
+        self,
+        steps: Sequence[Step],
+        found: Mapping[str, FoundRegion],
+        progress: Callable[[int, int], None] | None = None,
+    ) -> tuple[PathResult, ...]:
+        """Every step on its region, planned by several threads.
+
+        progress: called with (done, all) steps.
+        """
+        paths = []
+        with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+            planned = [pool.submit(self.path, *step, found[step[0]]) for step in steps]
+            try:
+                for done, path in enumerate(planned):
+                    if progress is not None:
+                        progress(done + 1, len(steps) + 1)
+                    paths.append(path.result())
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+        return tuple(paths)
+
+    def path(self, region: str, number: int, process: Process, found: FoundRegion) -> PathResult:
+        """One process on one region of the target."""
+        made = PathResult(region, number, process, process.transfer_mode)
+        if found.missing or found.mesh is None:
+            return replace(made, reason=found.missing)
+        if process.direction is not None:
+            indices = self.reference.bound_knowledge.regions[region]
+            given = np.array(process.direction)
+            direction = self.correspondence.map_direction(indices, given)
+            process = process.model_copy(update={"direction": tuple(direction.tolist())})
+        strategy = strategy_of(process)
+        warnings: tuple[str, ...] = ()
+        try:
+            if process.transfer_mode == "replan":
+                segments = plan_on_mesh(found.mesh, strategy)
+            else:
+                process, segments, warnings = self._warp(region, number, process, found.mesh)
+            metrics = measure_path(found.mesh, strategy, segments, self.given)
+        except ProcessError as error:
+            return replace(made, process=process, reason=str(error))
+        path = tool_path(region, process, segments)
+        return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
+
+    def _warp(
+        self, region: str, number: int, process: Process, mesh: RegionMesh
+    ) -> tuple[Process, tuple[Segment, ...], tuple[str, ...]]:
+        """A process with its waypoints warped to the target, its segments there, and warnings."""
+        strategy = strategy_of(process)
+        here = self.reference.segments(region, number)
+        there, lost = warp_segments(self.correspondence, here, process.tool.radius_m)
+        there = on_mesh(there, mesh.parent, strategy)
+        total = sum(len(segment.positions) for segment in here)
+        if not there:
+            raise ProcessError(f"none of the {total} waypoints has a place on the target")
+        warnings = [f"{lost} of {total} waypoints have no place on the target"] if lost else []
+        longest, warped = (max(longest_step(s.positions) for s in of) for of in (here, there))
+        if warped > _LONGER * longest:
+            warnings.append(
+                f"a step of {readable('_m', warped)} between neighbouring waypoints; the longest "
+                f"on the reference is {readable('_m', longest)}"
+            )
+        normals = [segment.normals for segment in there]
+        segments = add_approach_retract(there, normals, strategy)
+        waypoints = [
+            TaughtSegment(
+                positions_m=s.positions.tolist(), quaternions_xyzw=s.quaternions_xyzw.tolist()
+            )
+            for s in there
+        ]
+        changes = {"trajectory": "taught", "waypoints": waypoints, "transfer": None}
+        return process.model_copy(update=changes), segments, tuple(warnings)
