@@ -39,11 +39,12 @@ def test_the_figures_of_a_flat_board_meet_every_bar():
 
 
 def test_what_misses_a_bar_is_counted():
-    wide = replace(STRATEGY, stepover_m=0.11)  # twice as far apart as the pad is wide
-    results = evaluate_toolpaths([flat(), flat()], wide)
-    coverage = summarize(results, wide)[1]
+    edge = replace(STRATEGY, trajectory="edge")  # along the border alone
+    results = evaluate_toolpaths([flat(), flat()], edge)
+    coverage = summarize(results, edge)[1]
     assert not coverage.met.any()
-    assert coverage.worst == pytest.approx(50.0, abs=10.0)
+    rim = 1.0 - (0.4 - 2 * 0.025) * (0.3 - 2 * 0.025) / (0.4 * 0.3)
+    assert coverage.worst == pytest.approx(100.0 * rim, abs=15.0)
 
 
 def test_members_have_their_size_and_an_exact_surface():
