@@ -20,6 +20,7 @@ from nrdf.errors import DataError
 from nrdf.io.atomic import output_errors, write_atomically
 from nrdf.io.files import read_file
 from nrdf.process.transfer_result import MIN_CONFIDENCE
+from nrdf.regions.model import Model
 from nrdf.regions.presence import SURELY_ABSENT, Evidence, PresenceRule
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.families import get_family
@@ -61,15 +62,22 @@ _LARGEST = 1 << 26  # bytes of a file of examples
 
 
 def examples_of_objects(
-    retrieval: ObjectRetrieval, reference: str, target: str, views: Sequence[int] = VIEWS
+    retrieval: ObjectRetrieval,
+    reference: str,
+    target: str,
+    views: Sequence[int] = VIEWS,
+    model: Model | None = None,
 ) -> list[Example]:
-    """Every part of one labelled object, sought on another, whole and in scans."""
+    """Every part of one labelled object, sought on another by a model, whole and in scans.
+
+    model: the retrieval's, which aligns the scans, unless given.
+    """
     regions, cloud = retrieval.regions(reference), retrieval.whole_cloud(reference).cloud
-    encoded_reference, found = retrieval.model.set_reference(cloud), []
+    encoded_reference, found = (model or retrieval.model).set_reference(cloud), []
     for number in views:
         seen, truth = retrieval.target_cloud(target, number), retrieval.truth(target)
         for name, match in encoded_reference.retrieve_all(
-            regions, seen.encoded, drop_absent=False
+            regions, seen.encoded, drop_absent=False, check=False
         ).items():
             state = state_of(name, truth, seen.labelled)
             if state not in (THERE, ABSENT):

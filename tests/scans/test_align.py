@@ -9,7 +9,7 @@ from builders.scenes import UP, full, pose, scorer, yaw_error
 from nrdf.errors import CloudError
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.align import Alignment, Candidate, align_scan
-from nrdf.scans.pose_scorer import PoseScorer
+from nrdf.scans.field_pose_scorer import FieldPoseScorer
 
 CHAIR = 1_000_003
 PLACE = pose(2.2, 900.0, (300, -50, 20))
@@ -45,7 +45,7 @@ class Facing:
 @pytest.mark.parametrize(("way", "sure", "turned"), [(2.2, 3, 0), (2.2 + np.pi, 60, 180)])
 def test_what_faces_the_other_way_is_told_by_field_and_network_together(way, sure, turned):
     points = PLACE.to_scan(full("car", CHAIR).points)
-    asked = PoseScorer(scorer("car").model, yaw=Facing(way, sure))
+    asked = FieldPoseScorer(scorer("car").model, yaw=Facing(way, sure))
     found = align_scan(asked, PointCloud(points), UP)
     assert yaw_error(found.best.pose, PLACE) == pytest.approx(turned, abs=2)
     other = next(c for c in found.candidates if yaw_error(c.pose, found.best.pose) > 170)

@@ -93,4 +93,4 @@ def test_without_a_network_a_target_is_compared_with_the_reference(monkeypatch):
     car = taught.check_kind(taught.model.encode(PointCloud(member("car"))))
     lying = taught.check_kind(taught.model.encode(PointCloud(member("chair")[:, [0, 2, 1]])))
     assert same.fits and same.probability is None and not lying.fits
-    assert "the field explains it at a cost of" in car.warnings[0]
+    assert "what is known explains it at a cost of" in car.warnings[0]

@@ -165,8 +165,7 @@ def _from_scan(folder: Path, process_transfer: ProcessTransfer) -> TransferResul
     from nrdf.geometry.mesh import Mesh
     from nrdf.geometry.similarity import Similarity, up_axis, upright
     from nrdf.io.cloud import write_cloud
-    from nrdf.scans.aligned_scan import clean_and_align
-    from nrdf.scans.pose_scorer import PoseScorer
+    from nrdf.scans.aligned_scan import clean_and_align, pose_scorer
     from nrdf.scans.simulate import ScanSettings, simulate_scan
 
     mesh = bundled_mesh()
@@ -176,7 +175,7 @@ def _from_scan(folder: Path, process_transfer: ProcessTransfer) -> TransferResul
     rng = np.random.default_rng(0)
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
-    aligned = clean_and_align(PoseScorer(process_transfer.model), scan.cloud)
+    aligned = clean_and_align(pose_scorer(process_transfer.model), scan.cloud)
     encoded = aligned.encode_in_metres("m")
     true = Mesh(scan.pose.to_scan(mesh.vertices), mesh.faces)
     encoded = replace(encoded, cloud=replace(encoded.cloud, mesh=true))

@@ -53,7 +53,9 @@ class PresenceRule:
 # of labelled real objects and on members of families, whole and in scans of three views: what
 # `nrdf eval presence` prints (docs/evidence/scans.md).
 FIELD_RULE = PresenceRule(-0.78, Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46))
-REGISTRATION_RULE = PresenceRule(0.0, Evidence(existence=0.0, trust=0.0, size=0.0, returned=0.0))
+REGISTRATION_RULE = PresenceRule(
+    0.39, Evidence(existence=0.35, trust=1.09, size=2.29, returned=-0.05)
+)
 SURELY_ABSENT = 0.02
 """Overlap to be expected below which a region is taken to be absent, and comes back empty."""
 

@@ -21,6 +21,10 @@ from nrdf.shapes.registration import DisplacementInterpolator, RegistrationTempl
 _POINTS = 2048  # of the source, registered to twice as many of the target
 _BACK_POINTS = 1024  # of the target, likewise the other way round
 _KEPT = 2  # targets whose registration is kept
+# Odds that a mapped point lies on the right part: (doubt / _EVEN) ** -_STEEPNESS, the doubt being
+# its distance from the target and that much of how far it comes back to. A logistic regression on
+# the points of 74 pairs of labelled tables, benches, chairs and stools.
+_CYCLE_WEIGHT, _EVEN, _STEEPNESS = 0.39, 0.072, 1.32
 
 
 class RegistrationMapper:
@@ -95,8 +99,10 @@ class _RegisteredPair:
         moved = points + DisplacementInterpolator(self._from, points).interpolate(self._moved)
         distance = self.target.distance(moved, normals)
         returned = self._returned(moved)
-        cycle = np.linalg.norm(returned - points, axis=1)
-        return _mapped(moved, normals, distance, cycle)
+        doubt = distance + _CYCLE_WEIGHT * np.linalg.norm(returned - points, axis=1)
+        existence = 1.0 / (1.0 + (doubt / _EVEN) ** _STEEPNESS)
+        count = len(points)
+        return MappedPoints(moved, normals, existence, np.zeros(count), np.zeros((count, 3)))
 
     def map_back(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
         """Canonical points and normals (m, 3) of the target on the source."""
@@ -109,13 +115,6 @@ class _RegisteredPair:
     def _returned(self, points: np.ndarray) -> np.ndarray:
         along = DisplacementInterpolator(self._back_from, points)
         return points + along.interpolate(self._moved_back)
-
-
-def _mapped(
-    points: np.ndarray, normals: np.ndarray, distance: np.ndarray, cycle: np.ndarray
-) -> MappedPoints:
-    count = len(points)
-    return MappedPoints(points, normals, np.ones(count), np.zeros(count), np.zeros((count, 3)))
 
 
 def _subset(total: int, count: int, seed: int) -> np.ndarray:

@@ -30,11 +30,10 @@ _REFINED_WITH_YAW = 3, 2  # by the field's, and by the network's where there is 
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
-# Differences of cost that make a pose e times less likely. The field's alone was chosen on single
-# views of family members and public meshes: nine in ten wrong poses are reported as ambiguous, and
-# two in ten right ones. The other, and what the network counts for, were chosen on 84 scans (half
-# of them single views) of cars that the network was not trained on: no right pose is ambiguous.
-_COST_SCALE, _COST_SCALE_WITH_YAW = 0.036, 0.1
+# Difference of cost that makes a pose e times less likely (without a network it is the scorer's).
+# It, and what the network counts for, were chosen on 84 scans (half of them single views) of cars
+# that the network was not trained on: no right pose is ambiguous.
+_COST_SCALE_WITH_YAW = 0.1
 _YAW_COST = 0.1  # of a yaw that is e times less likely than the likeliest, by the network
 _LARGEST_YAW_COST = 3.0  # of those logarithms: the field can outweigh the network
 SURE = 0.8
@@ -170,7 +169,7 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
             cost, alone = float(costs[index]), float(field_costs[index])
             candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
     lap("fine")
-    scale = _COST_SCALE if scorer.yaw is None else _COST_SCALE_WITH_YAW
+    scale = scorer.cost_scale if scorer.yaw is None else _COST_SCALE_WITH_YAW
     weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / scale)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)

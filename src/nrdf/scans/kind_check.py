@@ -1,8 +1,7 @@
 """Check of the kind of object: of the category, upright, facing forward? Before any region.
 
 A network of the category tells (`nrdf.field.kind_network`). A category without one is checked by
-how well the field explains the target from known objects (`nrdf.scans.pose_scorer`), which says
-less.
+how well known objects explain the target (`nrdf.scans.pose_scorer`), which says less.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import numpy as np
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.field.kind_network import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
+from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import AXES, up_axis
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.objects import count_objects
@@ -23,11 +23,9 @@ from nrdf.scans.pose_scorer import PoseScorer
 
 MINIMUM_PROBABILITY = 0.3
 """Probability that an object stands upright and faces forward, below which there is a warning."""
-COST_MARGIN, COST_MARGIN_TO_ONE = 0.5, 0.55
-"""Cost above the usual one (`nrdf.scans.pose_scorer`) from which, without a network, there is a
-warning; the second where one object is all that is known."""
 LARGEST_Z_SCORE, LARGEST_Z_SCORE_TO_ONE = 1.65, 3.0
-"""Standard deviations of its proportions from the known objects', likewise."""
+"""Standard deviations of its proportions from the known objects', from which, without a network,
+there is a warning; the second where one object is all that is known."""
 _COUNTED = 2048  # points in which objects are counted
 FITS = "upright and facing forward"
 _SOMETHING_ELSE = "something else"
@@ -74,8 +72,22 @@ def check_kind(
     network = model.kind_network
     if network is None:
         given = scorer()
+        yaw = given.better_yaw(target)
+        if yaw is not None:
+            forward = target.pose.rotation @ rotation_about_up(yaw)[:, 0]
+            return _turned(given.name, forward, target.pose.rotation)
         return check_by_scorer(given, given.cost_of(target), target.points)
     return check_points(network, model.category, target.points, target.pose.rotation)
+
+
+def _turned(category: str, forward: np.ndarray, rotation: np.ndarray) -> KindCheck:
+    """A target that looks like its kind facing in another direction (3,)."""
+    looks, up = f"facing {_axis(forward)}", _letter(rotation[:, 1])
+    warning = (
+        f"the target does not look like a {category} facing {_axis(rotation[:, 0])}: it looks more "
+        f"like one that is {looks}; give --up {up} to have it aligned"
+    )
+    return KindCheck(category, looks, None, (warning,))
 
 
 def check_points(
@@ -172,16 +184,14 @@ def _letter(direction: np.ndarray) -> str:
 def check_by_scorer(scorer: PoseScorer, cost: float, points: np.ndarray) -> KindCheck:
     """Check canonical points (n, 3) against a few known objects of the category.
 
-    cost: at which the field explains the points by those (`PoseScorer.fine`).
+    cost: at which those explain the points (`PoseScorer.fine`).
     """
-    category, z_score = scorer.model.category or "known object", scorer.proportion_z_score(points)
-    cost_margin, largest = COST_MARGIN, LARGEST_Z_SCORE
-    if scorer.prototypes == 1:
-        cost_margin, largest = COST_MARGIN_TO_ONE, LARGEST_Z_SCORE_TO_ONE
-    if cost < scorer.usual_cost + cost_margin and z_score < largest:
+    category, z_score = scorer.name, scorer.proportion_z_score(points)
+    largest = LARGEST_Z_SCORE if scorer.prototypes > 1 else LARGEST_Z_SCORE_TO_ONE
+    if cost < scorer.usual_cost + scorer.cost_margin and z_score < largest:
         return KindCheck(category, "like what is known of its kind")
     warning = (
-        f"the target does not look like a {category} standing upright and facing +X: the field "
+        f"the target does not look like a {category} standing upright and facing +X: what is known "
         f"explains it at a cost of {cost:.2f}, {scorer.usual_cost:.2f} is usual, and its "
         f"proportions are {z_score:.1f} standard deviations off; check that it is one, and "
         "give --up with the direction that points up if it is in another pose"

@@ -20,6 +20,8 @@ def presence(
     out: Folder,
     objects: Folder | None = None,
     model: str = "chair",
+    group: tuple[str, ...] = ("chair+stool",),
+    registration: bool = False,
     category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
     pairs: int = 12,
     device: str = "cpu",
@@ -36,7 +38,10 @@ def presence(
 
     Args:
         out: Folder that keeps what was measured.
-        objects: Folder of labelled objects, as of nrdf eval objects; chairs and stools are taken.
+        objects: Folder of labelled objects, as of nrdf eval objects.
+        group: Categories of labelled objects to take, joined by "+" where they share parts. Only
+            those of the first are scanned as well, and aligned by the model.
+        registration: Fit the rule of the model registration, on labelled objects only.
         model: Zoo name, weight file or run, for the labelled objects.
         category: Families: chair, car, plane, or several of them.
         pairs: Pairs of members of each family, about 10 s each on one core.
@@ -46,6 +51,7 @@ def presence(
 
     import numpy as np
 
+    import nrdf
     from nrdf_benchmark.presence import (
         OBJECT_STEP,
         choose_pairs,
@@ -59,16 +65,17 @@ def presence(
 
     every: list[Example] = []
     if objects is not None:
-        retrieval, keys = _open_objects(objects, model, device)
+        retrieval, pairs_of_objects = _open_objects(objects, group, model, device)
+        seeker = nrdf.load_model("registration") if registration else retrieval.model
+        chosen = pairs_of_objects[::OBJECT_STEP]
         with progress_bar("parts of objects") as progress:
-            chosen = [(key, other) for key in keys for other in keys if key != other][::OBJECT_STEP]
-            for done, (key, other) in enumerate(chosen, 1):
+            for done, (key, other, views) in enumerate(chosen, 1):
                 name = f"{key}-{other}".replace("/", "_")
                 every += load_or_collect(
-                    out, name, partial(examples_of_objects, retrieval, key, other)
+                    out, name, partial(examples_of_objects, retrieval, key, other, views, seeker)
                 )
                 progress(done, len(chosen))
-    for name in category:
+    for name in () if registration else category:
         scorer = None
         with progress_bar(f"pairs of {name}s") as progress:
             for done, pair in enumerate(choose_pairs(name, pairs), 1):
@@ -96,19 +103,26 @@ def presence(
     console.print(f"correlation of expected and true overlap of what is there: {correlation:.2f}")
 
 
-def _open_objects(folder: Path, model: str, device: str) -> tuple[ObjectRetrieval, list[str]]:
+def _open_objects(
+    folder: Path, groups: tuple[str, ...], model: str, device: str
+) -> tuple[ObjectRetrieval, list[tuple[str, str, tuple[int, ...]]]]:
+    """The objects, and their pairs with the views that the target is seen in."""
     from nrdf.field.zoo import find_weights
     from nrdf_benchmark.objects.dataset import read_objects
-    from nrdf_benchmark.objects.retrieval import ObjectRetrieval, Settings
+    from nrdf_benchmark.objects.retrieval import WHOLE, ObjectRetrieval, Settings
+    from nrdf_benchmark.presence import VIEWS
 
     settings = Settings(folder.resolve(), find_weights(model).resolve(), device=device)
-    return ObjectRetrieval(settings), [
-        item.key for item in read_objects(folder, ("chair", "stool"))
-    ]
+    pairs: list[tuple[str, str, tuple[int, ...]]] = []
+    for number, group in enumerate(groups):
+        keys = [item.key for item in read_objects(folder, tuple(group.split("+")))]
+        views: tuple[int, ...] = (WHOLE,) if number else VIEWS
+        pairs += [(key, other, views) for key in keys for other in keys if key != other]
+    return ObjectRetrieval(settings), pairs
 
 
 def _scorer(name: str, device: str) -> PoseScorer:
     import nrdf
-    from nrdf.scans.pose_scorer import PoseScorer
+    from nrdf.scans.aligned_scan import pose_scorer
 
-    return PoseScorer(nrdf.load_model(name, device))
+    return pose_scorer(nrdf.load_model(name, device))

@@ -19,7 +19,7 @@ from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
-from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
+from nrdf.scans.aligned_scan import AlignedScan, clean_and_align, pose_scorer
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf_benchmark.methods.learned import FieldMethod
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method
@@ -134,7 +134,7 @@ class ObjectRetrieval:
 
     @cached_property
     def scorer(self) -> PoseScorer:
-        return PoseScorer(self.model)
+        return pose_scorer(self.model)
 
     def regions(self, key: str) -> dict[str, np.ndarray]:
         """The parts of an object that are large enough: name to indices of its whole cloud."""
