@@ -22,6 +22,7 @@ from nrdf.toolpath.types import SegmentGroup
 
 _ANCHORS_APART = 60
 _ROUNDS, _TILTED_ROUNDS = 5, 2
+_SWITCH = 0.9  # waypoints, at most, that the better turntable index is worth
 _SHORTEST = 3  # waypoints of a joint path that is worth a lift, unless nothing longer is found
 
 
@@ -104,7 +105,10 @@ def _cover(
     covered: list[np.ndarray],
     least: int,
 ) -> list[JointPath]:
-    """Joint paths, longest first; those whose approach or retract is blocked are left out."""
+    """As few joint paths as cover most; those whose approach or retract is blocked are left out.
+
+    least: waypoints that a joint path must add.
+    """
     paths: list[JointPath] = []
     dropped = np.zeros(len(candidates.group), bool)
     popular = np.bincount(
@@ -112,22 +116,16 @@ def _cover(
     )
     rank = np.argsort(np.argsort(popular)) / len(popular)
     while True:
-        best: dict[int, tuple[float, int, int, int]] = {}
-        for t in np.flatnonzero(~dropped):
-            i = int(candidates.group[t])
-            todo = candidates.good[t, : len(covered[i])] & ~covered[i]
-            index = np.flatnonzero(todo)
-            if len(index) < least:
-                continue
-            parted = (np.diff(index) > 1) | candidates.blocked[t, index[:-1]]
-            run = max(np.split(index, np.flatnonzero(parted) + 1), key=len)
-            # Of equally long ones, at the turntable index where most is done.
-            score = len(run) + 0.9 * rank[candidates.turntable_index[t]]
-            if len(run) >= least and score > best.get(i, (0.0,))[0]:
-                best[i] = (score, int(t), int(run[0]), int(run[-1]))
-        if not best:
+        chosen: list[tuple[int, int, int]] = []
+        for i in np.unique(candidates.group[~dropped]):
+            runs = []
+            for t in np.flatnonzero(~dropped & (candidates.group == i)):
+                # Of equally good ones, at the turntable index where most is done.
+                price = least + _SWITCH * (1.0 - rank[candidates.turntable_index[t]])
+                runs += [(int(t), *run, price) for run in _runs(candidates, int(t), covered[i])]
+            chosen += fewest_runs(runs, ~covered[i])
+        if not chosen:
             return paths
-        chosen = [(row, first, last) for _, row, first, last in best.values()]
         for (row, first, last), path in zip(
             chosen, _complete(cell, groups, candidates, chosen), strict=True
         ):
@@ -136,6 +134,48 @@ def _cover(
                 covered[path.group][first : last + 1] = True
             elif not candidates.blocked[row, first:last].any():
                 dropped[row] = True
+
+
+def _runs(candidates: CandidatePaths, row: int, covered: np.ndarray) -> list[tuple[int, int]]:
+    """First and last waypoint of each stretch that a candidate tracks and that is not covered."""
+    index = np.flatnonzero(candidates.good[row, : len(covered)] & ~covered)
+    if not len(index):
+        return []
+    parted = np.flatnonzero((np.diff(index) > 1) | candidates.blocked[row, index[:-1]])
+    return [(int(run[0]), int(run[-1])) for run in np.split(index, parted + 1)]
+
+
+def fewest_runs(
+    runs: Sequence[tuple[int, int, int, float]], wanted: np.ndarray
+) -> list[tuple[int, int, int]]:
+    """Parts (row, first, last) of runs (row, first, last, price) that cover wanted waypoints (n,)
+    for the least sum of prices, where each wanted waypoint that is left out costs 1.
+
+    No two overlap. Optimal, by dynamic programming: each run is used to its end, from wherever the
+    one before it ended.
+    """
+    count = len(wanted)
+    ending: dict[int, list[tuple[int, int, float]]] = {}
+    for row, first, last, price in runs:
+        ending.setdefault(last + 1, []).append((row, first, price))
+    cost = np.zeros(count + 1)
+    via: list[tuple[int, int] | None] = [None] * (count + 1)
+    for end in range(1, count + 1):
+        cost[end] = cost[end - 1] + float(wanted[end - 1])
+        for row, first, price in ending.get(end, ()):
+            # From where it costs least to have come, as late as that: no waypoint is driven twice.
+            begin = end - 1 - int(cost[first:end][::-1].argmin())
+            if cost[begin] + price < cost[end]:
+                cost[end], via[end] = cost[begin] + price, (row, begin)
+    chosen, end = [], count
+    while end > 0:
+        step = via[end]
+        if step is None:
+            end -= 1
+        else:
+            chosen.append((step[0], step[1], end - 1))
+            end = step[1]
+    return chosen[::-1]
 
 
 def _complete(
