@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from nrdf.geometry.simplify import simplified
+from nrdf.geometry.simplify import simplified, split_at_edges
 
 BALL = trimesh.creation.icosphere(5, 0.5)
 """20,480 triangles."""
@@ -23,3 +23,12 @@ def test_a_mesh_with_few_triangles_stays_as_it_is():
     vertices, faces = np.array(BALL.vertices), np.array(BALL.faces)
     same = simplified(vertices, faces, len(faces))
     assert same[0] is vertices and same[1] is faces
+
+
+def test_vertices_are_apart_at_sharp_edges_alone():
+    cube = trimesh.creation.box()
+    vertices, faces = split_at_edges(np.array(cube.vertices), np.array(cube.faces))
+    assert len(vertices) == 24 and len(faces) == 12
+    np.testing.assert_array_equal(vertices[faces], cube.vertices[cube.faces])
+    vertices, faces = split_at_edges(np.array(BALL.vertices), np.array(BALL.faces))
+    assert len(vertices) == len(BALL.vertices)

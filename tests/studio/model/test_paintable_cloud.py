@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+
 from builders.taught_box import SIZE, cloud
+from nrdf.geometry.mesh import Mesh
+from nrdf.studio.model.paintable_cloud import PaintableCloud
 
 
 def test_a_large_target_is_shown_thinned_and_painted_whole(results):
@@ -14,3 +21,12 @@ def test_a_large_target_is_shown_thinned_and_painted_whole(results):
     whole = body.to_all(mask)
     truth = body.cloud.points[:, 1] > body.high[1] - 1e-6
     assert (whole == truth).mean() > 0.98 and (body.to_shown(whole) == mask).all()
+
+
+def test_a_mesh_is_shown_with_at_most_so_many_triangles(monkeypatch):
+    ball = trimesh.creation.icosphere(4, 0.3)
+    whole = replace(cloud(SIZE, 600, 0), mesh=Mesh(np.array(ball.vertices), np.array(ball.faces)))
+    assert PaintableCloud(whole).mesh.faces.shape == ball.faces.shape
+    monkeypatch.setattr("nrdf.studio.model.paintable_cloud.SHOWN_FACES", 500)
+    assert 100 < len(PaintableCloud(whole).mesh.faces) <= 500
+    assert PaintableCloud(cloud(SIZE, 600, 0)).mesh is None

@@ -8,7 +8,7 @@ again with the tool axis tilted a little.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from nrdf.toolpath.types import SegmentGroup
 
 _ANCHORS_APART = 60
 _ROUNDS, _TILTED_ROUNDS = 5, 2
-_SWITCH = 0.9  # waypoints, at most, that the better turntable index is worth
+_TURN = 6  # waypoints that a turn of the object must add, or save in lifts
 _SHORTEST = 3  # waypoints of a joint path that is worth a lift, unless nothing longer is found
 
 
@@ -36,19 +36,20 @@ def plan_joint_paths(
     """
     covered = [np.zeros(len(group.process.positions), bool) for group in groups]
     paths: list[JointPath] = []
+    opened: set[int] = set()
     for round_ in range(_ROUNDS):
         anchors = _all_anchors(covered, round_)
         if not anchors:
             break
         fresh = track_from(cell, library, groups, covered, anchors, tilt=False)
-        paths += _cover(cell, groups, fresh, covered, _SHORTEST if round_ < 2 else 1)
-    paths = _lengthened(cell, groups, paths, covered)
+        paths += _cover(cell, groups, fresh, covered, _SHORTEST if round_ < 2 else 1, opened)
+    paths = _lengthened(cell, groups, paths, covered, opened)
     for round_ in range(_TILTED_ROUNDS):
         anchors = _all_anchors(covered, round_ + 2)
         if not anchors:
             break
         fresh = track_from(cell, library, groups, covered, anchors, tilt=True)
-        paths += _cover(cell, groups, fresh, covered, 1)
+        paths += _cover(cell, groups, fresh, covered, 1, opened)
     reachability = []
     for group, done in zip(groups, covered, strict=True):
         made = Reachability(*(done.copy() for _ in range(3)))
@@ -84,6 +85,7 @@ def _lengthened(
     groups: Sequence[SegmentGroup],
     paths: list[JointPath],
     covered: list[np.ndarray],
+    opened: set[int],
 ) -> list[JointPath]:
     """Joint paths of segments that are not all covered, longer by what the tool reaches when its
     axis tilts."""
@@ -95,7 +97,7 @@ def _lengthened(
     for path in again:
         covered[path.group][:] = False
     kept = [path for path in paths if whole[path.group]]
-    return kept + _cover(cell, groups, candidates, covered, 1)
+    return kept + _cover(cell, groups, candidates, covered, 1, opened)
 
 
 def _cover(
@@ -104,26 +106,24 @@ def _cover(
     candidates: CandidatePaths,
     covered: list[np.ndarray],
     least: int,
+    opened: set[int],
 ) -> list[JointPath]:
     """As few joint paths as cover most; those whose approach or retract is blocked are left out.
 
-    least: waypoints that a joint path must add.
+    least: waypoints that a joint path must add. opened: turntable indices in use, which grow.
     """
     paths: list[JointPath] = []
     dropped = np.zeros(len(candidates.group), bool)
-    popular = np.bincount(
-        candidates.turntable_index, candidates.good.sum(axis=1), len(cell.T_base_object)
-    )
-    rank = np.argsort(np.argsort(popular)) / len(popular)
     while True:
-        chosen: list[tuple[int, int, int]] = []
-        for i in np.unique(candidates.group[~dropped]):
-            runs = []
-            for t in np.flatnonzero(~dropped & (candidates.group == i)):
-                # Of equally good ones, at the turntable index where most is done.
-                price = least + _SWITCH * (1.0 - rank[candidates.turntable_index[t]])
-                runs += [(int(t), *run, price) for run in _runs(candidates, int(t), covered[i])]
-            chosen += fewest_runs(runs, ~covered[i])
+        runs = {
+            int(i): [
+                (int(t), *run)
+                for t in np.flatnonzero(~dropped & (candidates.group == i))
+                for run in _runs(candidates, int(t), covered[i])
+            ]
+            for i in np.unique(candidates.group[~dropped])
+        }
+        chosen = _on_few_turns(candidates, runs, covered, least, opened)
         if not chosen:
             return paths
         for (row, first, last), path in zip(
@@ -132,8 +132,46 @@ def _cover(
             if path is not None:
                 paths.append(path)
                 covered[path.group][first : last + 1] = True
+                opened.add(path.turntable_index)
             elif not candidates.blocked[row, first:last].any():
                 dropped[row] = True
+
+
+def _on_few_turns(
+    candidates: CandidatePaths,
+    runs: Mapping[int, Sequence[tuple[int, int, int]]],
+    covered: Sequence[np.ndarray],
+    least: int,
+    opened: Collection[int],
+) -> list[tuple[int, int, int]]:
+    """The best parts (row, first, last) of each group's runs, at as few turntable indices as pay.
+
+    opened: indices that are used already. Another one is used where that saves `_TURN` waypoints:
+    the one that saves most, time and again.
+    """
+    index = candidates.turntable_index
+
+    def best(used: Collection[int]) -> tuple[float, list[tuple[int, int, int]]]:
+        cost, chosen = 0.0, []
+        for i, some in runs.items():
+            priced = [(*run, float(least)) for run in some if index[run[0]] in used]
+            parts = fewest_runs(priced, ~covered[i])
+            done = ~covered[i]
+            for _, first, last in parts:
+                done[first : last + 1] = False
+            cost += float(done.sum()) + least * len(parts)
+            chosen += parts
+        return cost, chosen
+
+    used = set(opened)
+    cost, chosen = best(used)
+    while True:
+        others = {int(index[row]) for some in runs.values() for row, *_ in some} - used
+        found = [(*best({*used, other}), other) for other in sorted(others)]
+        if not found or (least_cost := min(entry[0] for entry in found)) > cost - _TURN:
+            return chosen
+        cost, chosen, other = next(entry for entry in found if entry[0] == least_cost)
+        used.add(other)
 
 
 def _runs(candidates: CandidatePaths, row: int, covered: np.ndarray) -> list[tuple[int, int]]:

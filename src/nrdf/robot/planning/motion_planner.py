@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nrdf.geometry.polylines import interpolate, summed
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.inverse_kinematics import LEAST_CLEARANCE_M, SeedLibrary
 
@@ -20,6 +21,8 @@ _BRIDGES, _BRIDGE_CLEARANCE_M = 1500, 0.02
 _EXTENSION_RAD = 0.5
 _MOST_EXTENSIONS = 80
 _SHORTCUTS = 12
+_CUTS = 24  # of corners, tried at random
+_CORNER_S = 0.25  # that a stop at a corner takes
 
 
 class Roadmap:
@@ -65,11 +68,11 @@ class Roadmap:
         return None
 
     def path(self, one: int, other: int) -> np.ndarray:
-        """Joints (k, n) at the corners of a free move between two nodes, as few as may be."""
+        """Joints (k, n) at the corners of a free move between two nodes, a short way round."""
         up, down = self._to_root(one), self._to_root(other)
         common = next(node for node in up if node in set(down))
         route = up[: up.index(common) + 1] + down[: down.index(common)][::-1]
-        return self._shortened(self.nodes[route])
+        return self._cut_short(self._shortened(self.nodes[route]))
 
     def is_free(self, one: np.ndarray, other: np.ndarray) -> bool:
         """Whether the straight move between two configurations hits nothing."""
@@ -182,6 +185,25 @@ class Roadmap:
             if done:
                 break
         return path
+
+    def _cut_short(self, path: np.ndarray) -> np.ndarray:
+        """The path with straight moves between places inside its legs, where those are free
+        (Geraerts and Overmars, 2007)."""
+        speeds = self.cell.chain.speeds
+        for _ in range(_CUTS):
+            if len(path) < 3:
+                break
+            took = summed((np.abs(np.diff(path, axis=0)) / speeds).max(axis=1))
+            at = np.sort(self.rng.uniform(0.0, took[-1], 2))
+            leg = np.searchsorted(took, at, side="right") - 1
+            if leg[0] == leg[1]:
+                continue
+            ends = interpolate(at, took, path)
+            saved = at[1] - at[0] - float((np.abs(ends[1] - ends[0]) / speeds).max())
+            corners = leg[1] - leg[0]
+            if saved + _CORNER_S * (corners - 2) > 0.0 and self.is_free(ends[0], ends[1]):
+                path = np.concatenate([path[: leg[0] + 1], ends, path[leg[1] + 1 :]])
+        return self._shortened(path)
 
     @staticmethod
     def _nearest_index(nodes: np.ndarray, joints: np.ndarray, count: int) -> np.ndarray:

@@ -9,8 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.cloud_encoder import WORKING_POINTS
+from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import distinct_points, downsample
+from nrdf.geometry.simplify import simplified
 from nrdf.io.cloud import PointCloud
 from nrdf.studio.model.painting import Canvas
 from nrdf.surface.given_surface import GivenSurface, given_surface
@@ -18,6 +20,9 @@ from nrdf.surface.object_mesh import object_mesh
 from nrdf.surface.region_mesh import RegionMesh, region_mesh
 from nrdf.surface.surface import Surface
 from nrdf.surface.target_mesh import TargetMesh
+
+SHOWN_FACES = 200_000
+"""Triangles of an object that a browser draws without a stutter."""
 
 
 class PaintableCloud:
@@ -48,6 +53,14 @@ class PaintableCloud:
     def canvas(self) -> Canvas:
         """The shown points, to be painted on."""
         return Canvas(self.surface)
+
+    @cached_property
+    def mesh(self) -> Mesh | None:
+        """The object's mesh, m, of at most `SHOWN_FACES` triangles; None for a scan."""
+        given = self.cloud.mesh
+        if given is None:
+            return None
+        return Mesh(*simplified(given.vertices, given.faces, SHOWN_FACES))
 
     @cached_property
     def given(self) -> GivenSurface:

@@ -6,12 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
+import igl
 import numpy as np
 import viser
 
 from nrdf.geometry.frames import quaternions_wxyz, unit_vectors
-from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.simplify import simplified, split_at_edges
+from nrdf.studio.model.paintable_cloud import SHOWN_FACES, PaintableCloud
 from nrdf.studio.scene.camera import Camera, first_hit
+from nrdf.studio.scene.colours import BARE
+from nrdf.viz.mesh_render import Triangles
 
 FOV_RAD = np.radians(48.0)
 _FRONT = np.array([0.86, 0.52, 0.34])
@@ -22,7 +27,8 @@ _MARGIN = 1.06  # of the camera's distance, in distances at which everything is 
 _ABOVE = 0.14  # of the label above the object, in the scene
 _GAP = 0.25  # between objects, in sides of the largest
 _SIZE = 1.38  # of a point, in spacings
-_LIFT = 1.4  # of lines above the surface, in spacings
+_LIFT = 1.4  # of lines above points, in spacings
+_ON_MESH = 0.0015  # of lines above a mesh, in sides of the object; regions lie half as high
 _LIGHT = np.array([0.62, 0.70, 0.35])
 """Direction to the light: front, above, right."""
 _DARKEST = 0.58  # brightness of a point that faces away from the light
@@ -49,6 +55,9 @@ class ObjectView:
             point_shading="flat",
             precision="float32",
         )
+        self._regions: list[viser.SceneNodeHandle] = []
+        if paintable.mesh is not None:
+            self._add_mesh("mesh", paintable.mesh, BARE)
         size = (paintable.high - paintable.low) * scene_view.units_per_m
         # Invisible: drags that paint must begin on something. Only lines, for slow renderers.
         self.drag_box = scene.add_box(
@@ -93,10 +102,45 @@ class ObjectView:
         self.frame.wxyz = tuple(quaternions_wxyz(self._rotation))
 
     def set_colours(self, colours: np.ndarray) -> None:
-        """Set the colours (k, 3) uint8 of the shown points; shading is added here."""
+        """Set the colours (k, 3) uint8 of the shown points; shading is added here.
+
+        Above a mesh only points that have a colour of their own are drawn, and none where regions'
+        meshes are.
+        """
         facing = 0.5 + 0.5 * self.paintable.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
         shade = _DARKEST + (1 - _DARKEST) * facing
-        self.points.colors = (colours * shade[:, None]).astype(np.uint8)
+        shaded = (colours * shade[:, None]).astype(np.uint8)
+        if self.paintable.mesh is not None:
+            own = (colours != BARE.astype(np.uint8)).any(axis=1) & (not self._regions)
+            points = self.paintable.points[own] * self.scene_view.units_per_m
+            self.points.points, shaded = points.astype(np.float32), shaded[own]
+        self.points.colors = shaded
+
+    def draw_regions(self, regions: Mapping[str, tuple[Triangles, np.ndarray]]) -> None:
+        """Draw the meshes of regions by name, m, in place of all earlier ones, each with a colour
+        (3,), 0 to 255."""
+        for handle in self._regions:
+            handle.remove()
+        self._regions.clear()
+        lift = 0.5 * _ON_MESH * self.paintable.longest_side
+        for number, (mesh, colour) in enumerate(regions.values()):
+            vertices, faces = simplified(mesh.vertices, mesh.faces, SHOWN_FACES)
+            normals = np.asarray(igl.per_vertex_normals(vertices, faces))
+            lifted = vertices + lift * unit_vectors(np.nan_to_num(normals))
+            self._regions.append(self._add_mesh(f"region{number}", Mesh(lifted, faces), colour))
+
+    def _add_mesh(self, name: str, mesh: Mesh, colour: np.ndarray) -> viser.SceneNodeHandle:
+        vertices, faces = split_at_edges(mesh.vertices, mesh.faces)
+        red, green, blue = (int(value) for value in colour)
+        return self.scene_view.server.scene.add_mesh_simple(
+            f"{self.path}/{name}",
+            (vertices * self.scene_view.units_per_m).astype(np.float32),
+            faces.astype(np.uint32),
+            color=(red, green, blue),
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
     def set_drag_callback(self, callback: Callable[..., Any] | None) -> None:
         """Call this for drags that begin on the object; None gives them to the camera."""
@@ -173,8 +217,11 @@ class ObjectView:
         self.frame.remove()
 
     def _lifted(self, line: np.ndarray) -> np.ndarray:
-        near = self.paintable.surface.tree.query(line)[1]
-        return line + _LIFT * self.paintable.surface.spacing * self.paintable.surface.normals[near]
+        surface = self.paintable.surface
+        lift = _LIFT * surface.spacing
+        if self.paintable.mesh is not None:
+            lift = _ON_MESH * self.paintable.longest_side
+        return line + lift * surface.normals[surface.tree.query(line)[1]]
 
 
 class SceneView:
