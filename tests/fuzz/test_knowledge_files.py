@@ -17,7 +17,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge, resolve
 from nrdf.process.check import CheckedProcess, check_knowledge
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import read_knowledge, write_knowledge
-from nrdf.toolpath import plan_size
+from nrdf.toolpath import size_limits
 
 BOX = cloud(count=600)
 TOP = faces(BOX)["top"]
@@ -109,7 +109,7 @@ def test_damaged_json(folder, content):
 @given(altered(CONTENT))
 def test_altered_content_is_read_bound_and_planned_or_refused(folder, content):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan_size, "MOST_WAYPOINTS", 3000)
+        patch.setattr(size_limits, "MOST_WAYPOINTS", 3000)
         knowledge = read(folder, yaml.dump(content, Dumper=yaml.SafeDumper).encode())
         if isinstance(knowledge, Knowledge):
             use(folder, knowledge)
@@ -130,7 +130,7 @@ def test_numbers_that_are_meant_are_planned_or_refused(folder, numbers, radius, 
     process["allow_unusual"] = True
     content = {**CONTENT, "regions": [{**region, "processes": [process]}]}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan_size, "MOST_WAYPOINTS", 3000)
+        patch.setattr(size_limits, "MOST_WAYPOINTS", 3000)
         knowledge = read(folder, yaml.safe_dump(content).encode())
         if isinstance(knowledge, Knowledge):
             use(folder, knowledge)
