@@ -29,7 +29,7 @@ from nrdf.studio.model.teaching import ORIGIN
 from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
 from nrdf.studio.scene.colours import COLOURINGS, similarity_colours
-from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, title_of
+from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, region_meshes_of, title_of
 from nrdf.studio.scene.scene_view import ObjectView, SceneView
 
 if TYPE_CHECKING:
@@ -114,13 +114,19 @@ class StudioContext(ABC):
 
     def draw_colours(self, object_view: ObjectView) -> None:
         """Draw the colours of one object."""
-        if self._shows_similarity(object_view):
-            distances = self._distances[object_view.key]
-            object_view.set_colours(similarity_colours(distances, self.similarity_width))
+        key = object_view.key
+        by_confidence = self.colouring == "confidence"
+        by_similarity = self._shows_similarity(object_view)
+        plain = not (by_confidence or by_similarity)
+        meshes = region_meshes_of(self.editor, self.results, key) if plain else {}
+        result = self.results.by_target.get(key)
+        object_view.draw_surface(None if result is None else result.transfer_result.surface)
+        object_view.draw_regions(meshes)
+        if by_similarity:
+            colours = similarity_colours(self._distances[key], self.similarity_width)
         else:
-            by_confidence = self.colouring == "confidence"
-            colours = colours_of(self.editor, self.results, object_view.key, by_confidence)
-            object_view.set_colours(colours)
+            colours = colours_of(self.editor, self.results, key, by_confidence, meshes)
+        object_view.set_colours(colours)
 
     def recolour(self, colouring: str, width: float) -> None:
         """Colour by something else, or by another width of similarity.

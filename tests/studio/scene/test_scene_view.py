@@ -93,17 +93,24 @@ def test_an_object_with_a_mesh_is_drawn_as_one_and_painted_points_above_it(scene
     assert view.points.colors.shape == (40, 3)
 
 
-def test_meshes_of_regions_replace_the_points_and_the_earlier_ones(scene_view):
+def test_meshes_of_regions_replace_the_earlier_ones(scene_view):
     view = scene_view.add("box", PaintableCloud(with_mesh()))
     mesh = view.paintable.mesh
     red = np.array([200, 30, 30])
-    painted = np.tile(red, (len(view.paintable.points), 1)).astype(np.uint8)
     view.draw_regions({"all": (mesh, red), "again": (mesh, red)})
-    view.set_colours(painted)
-    assert len(view.points.points) == 0 and len(view._regions) == 2
-    view.draw_regions({})
-    view.set_colours(painted)
-    assert len(view.points.points) == len(view.paintable.points) and not view._regions
+    assert len(view._regions) == 2
+    view.draw_regions({"all": (mesh, red)})
+    assert len(view._regions) == 1
+
+
+def test_a_scan_is_drawn_as_the_mesh_that_was_made_of_it(scene_view):
+    view = scene_view.add("box", PaintableCloud(cloud(SIZE, 600, 0)))
+    bare = np.tile(BARE, (len(view.paintable.points), 1)).astype(np.uint8)
+    view.set_colours(bare)
+    assert len(view.points.points) == len(bare), "no mesh yet"
+    view.draw_surface(with_mesh().mesh)
+    view.set_colours(bare)
+    assert len(view.points.points) == 0
 
 
 def test_lines_lie_close_above_a_mesh(scene_view):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.scene.colours import confidence_colours, painted_colours
+from nrdf.surface.target_mesh import TargetMesh
 
 _DEEP, _PALE = 0.5, 0.62
 """Shares of a region's colour in the lines on it, and in the region where found are lines."""
@@ -25,16 +26,41 @@ def found_indices(results: ResultCache, key: str, region: str) -> np.ndarray | N
     return None if region_there.missing else region_there.match.indices
 
 
+def region_meshes_of(
+    editor: Editor, results: ResultCache, key: str
+) -> dict[str, tuple[TargetMesh, np.ndarray]]:
+    """The meshes of a target's regions that were found: name to (mesh, m; colour (3,)), paler where
+    the confidence is lower. Regions that a person has corrected have none: they are painted."""
+    result, target = results.by_target.get(key), editor.target(key)
+    if result is None or target is None:
+        return {}
+    drawn = {}
+    for region in editor.document.regions:
+        found = result.transfer_result.regions.get(region.name)
+        if found is None or found.mesh is None or region.name in target.corrected:
+            continue
+        strength = 0.2 + 0.8 * found.match.score
+        colour = strength * np.array(_pale(region.colour)) + (1.0 - strength) * 255.0
+        drawn[region.name] = (found.mesh.mesh, colour)
+    return drawn
+
+
 def colours_of(
-    editor: Editor, results: ResultCache, key: str, by_confidence: bool = False
+    editor: Editor,
+    results: ResultCache,
+    key: str,
+    by_confidence: bool = False,
+    without: Collection[str] = (),
 ) -> np.ndarray:
-    """Colours (k, 3) uint8 of an object's shown points by their regions.
+    """Colours (k, 3) uint8 of an object's shown points by their regions, some left out.
 
     On a target they are paler where the confidence is lower; `by_confidence` shows it alone.
     """
     paintable, target = editor.paintable(key), editor.target(key)
     drawn: list[tuple[tuple[int, int, int], np.ndarray, np.ndarray | None]] = []
     for region in editor.document.regions:
+        if region.name in without:
+            continue
         found = found_indices(results, key, region.name)
         corrected = target is not None and region.name in target.corrected
         confidence = None

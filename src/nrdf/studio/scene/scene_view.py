@@ -56,8 +56,8 @@ class ObjectView:
             precision="float32",
         )
         self._regions: list[viser.SceneNodeHandle] = []
-        if paintable.mesh is not None:
-            self._add_mesh("mesh", paintable.mesh, BARE)
+        self._mesh: viser.SceneNodeHandle | None = None
+        self.draw_surface(None)
         size = (paintable.high - paintable.low) * scene_view.units_per_m
         # Invisible: drags that paint must begin on something. Only lines, for slow renderers.
         self.drag_box = scene.add_box(
@@ -104,17 +104,27 @@ class ObjectView:
     def set_colours(self, colours: np.ndarray) -> None:
         """Set the colours (k, 3) uint8 of the shown points; shading is added here.
 
-        Above a mesh only points that have a colour of their own are drawn, and none where regions'
-        meshes are.
+        Above a mesh only points that have a colour of their own are drawn.
         """
         facing = 0.5 + 0.5 * self.paintable.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
         shade = _DARKEST + (1 - _DARKEST) * facing
         shaded = (colours * shade[:, None]).astype(np.uint8)
-        if self.paintable.mesh is not None:
-            own = (colours != BARE.astype(np.uint8)).any(axis=1) & (not self._regions)
+        if self._mesh is not None:
+            own = (colours != BARE.astype(np.uint8)).any(axis=1)
             points = self.paintable.points[own] * self.scene_view.units_per_m
             self.points.points, shaded = points.astype(np.float32), shaded[own]
         self.points.colors = shaded
+
+    def draw_surface(self, mesh: Triangles | None) -> None:
+        """Draw an object's own mesh, or, where it has none, this one, m; None for no mesh."""
+        shown = self.paintable.mesh
+        if shown is None and mesh is not None:
+            shown = Mesh(*simplified(mesh.vertices, mesh.faces, SHOWN_FACES))
+        elif shown is not None and self._mesh is not None:
+            return
+        if self._mesh is not None:
+            self._mesh.remove()
+        self._mesh = None if shown is None else self._add_mesh("mesh", shown, BARE)
 
     def draw_regions(self, regions: Mapping[str, tuple[Triangles, np.ndarray]]) -> None:
         """Draw the meshes of regions by name, m, in place of all earlier ones, each with a colour
@@ -219,7 +229,7 @@ class ObjectView:
     def _lifted(self, line: np.ndarray) -> np.ndarray:
         surface = self.paintable.surface
         lift = _LIFT * surface.spacing
-        if self.paintable.mesh is not None:
+        if self._mesh is not None:
             lift = _ON_MESH * self.paintable.longest_side
         return line + lift * surface.normals[surface.tree.query(line)[1]]
 
