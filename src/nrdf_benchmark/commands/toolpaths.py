@@ -20,7 +20,7 @@ def toolpaths(
     trajectory: Trajectory = "raster",
     edge_margin_mm: NonNegative = 0.0,
     meshes: tuple[Annotated[Path, Metavar("FOLDER")], ...] = (),
-    planner: str = "raster",
+    planner: str = "auto",
     surface: Literal["mesh", "votes", "scan"] = "mesh",
     sample: Count | None = None,
     out: Folder | None = None,
@@ -47,7 +47,8 @@ def toolpaths(
         trajectory: A planner's name in nrdf.toolpath.planners; not for --meshes.
         edge_margin_mm: Margin along the regions' borders; not for --meshes.
         meshes: Folders of meshes, or mesh files.
-        planner: With --meshes, a planner's name in nrdf.toolpath.planners.
+        planner: With --meshes: "auto", rods for legs, rails and armrests and rasters for all else;
+            or a planner's name in nrdf.toolpath.planners.
         surface: What is planned on: the mesh with its own faces as
             regions; "votes": the mesh, regions by votes of points as in retrieval; "scan": a mesh
             made of a simulated scan of three views, 200,000 points with noise of 1 mm.

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from nrdf.errors import DataError, NrdfError, unknown_name
+from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.planners import PLANNERS
 from nrdf.toolpath.strategy import Strategy
@@ -19,6 +20,9 @@ from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, TargetSource
 from nrdf_benchmark.result_cache import LineCache, code_checksum
 
+AUTO = "auto"
+"""The planner that an engineer would take for a region of that name, see `usual_planner`."""
+_RODS = ("leg", "rail", "arm", "armrest")
 SOURCES = (
     "nrdf/geometry", "nrdf/surface", "nrdf/toolpath", "nrdf_benchmark/mesh_paths",
     "nrdf_benchmark/objects/dataset.py",
@@ -39,24 +43,30 @@ class MeshPathResult:
     error: str = ""
 
 
-RegionPlanner = Callable[[str], tuple[Segment, ...]]
+RegionPlanner = Callable[[str], tuple[tuple[Segment, ...], RegionMesh | None]]
+"""From a region's name to its path, and the region that was found, where it was not given."""
+
+
+def usual_planner(region: str) -> str:
+    """Rod for legs, rails and armrests, raster for all else: seats, backs, tops, bonnets."""
+    return "rod" if region in _RODS else "raster"
 
 
 def evaluate_mesh_paths(
     sources: Sequence[TargetSource],
-    planner: str = "raster",
+    planner: str = AUTO,
     cache: LineCache | None = None,
     progress: Callable[[int, int], None] | None = None,
     surface: SurfaceKind = "mesh",
 ) -> list[MeshPathResult]:
     """Plan and measure on every region; meshes that `cache` has are not planned on again.
 
-    planner: a name in `nrdf.toolpath.planners.PLANNERS`. surface: what it plans on.
+    planner: a name in `nrdf.toolpath.planners.PLANNERS`, or `AUTO`. surface: what it plans on.
     `progress` is told (done, all). Raises DataError for a planner that there is not, or a mesh that
     cannot be used.
     """
-    if planner not in PLANNERS:
-        raise DataError(unknown_name("planner", planner, list(PLANNERS)))
+    if planner not in (AUTO, *PLANNERS):
+        raise DataError(unknown_name("planner", planner, [AUTO, *PLANNERS]))
     marks = {_fingerprint(source, planner, surface): source.name for source in sources}
     file = f"toolpaths-{planner}-{surface}.jsonl"
     lines = cache.read(file, marks) if cache else {}
@@ -80,18 +90,20 @@ def _evaluate(target: MeshTarget, planner: str, surface: SurfaceKind) -> list[Me
     shared = (time.process_time() - start) / max(len(target.visible_regions), 1)
     results = []
     for region in target.visible_regions:
-        metrics, error = None, ""
+        name = usual_planner(region) if planner == AUTO else planner
+        segments: tuple[Segment, ...] = ()
+        metrics, error, found = None, "", None
         start = time.process_time()
         try:
-            segments = make(region)
+            segments, found = make(region)
         except NrdfError as failed:
-            segments, error = (), str(failed)
+            error = str(failed)
         seconds = shared + time.process_time() - start
         if any(segment.kind == "process" for segment in segments):
-            metrics = measure_mesh_path(target, region, segments, strategy)
+            metrics = measure_mesh_path(target, region, segments, strategy, found)
         elif not error:
             error = "the planner made no process segment"
-        results.append(MeshPathResult(planner, target.name, region, seconds, metrics, error))
+        results.append(MeshPathResult(name, target.name, region, seconds, metrics, error))
     return results
 
 
@@ -100,9 +112,11 @@ def _on_mesh(
 ) -> RegionPlanner:
     find = regions_on(target, surface)
 
-    def make(region: str) -> tuple[Segment, ...]:
+    def make(region: str) -> tuple[tuple[Segment, ...], RegionMesh | None]:
         found = find(region)
-        return plan_on_mesh(found, strategy, PLANNERS[planner])
+        name = usual_planner(region) if planner == AUTO else planner
+        segments = plan_on_mesh(found, strategy, PLANNERS[name])
+        return segments, None if surface == "mesh" else found
 
     return make
 

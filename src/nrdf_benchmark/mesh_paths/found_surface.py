@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-import igl
 import numpy as np
 
 from nrdf.field.cloud_encoder import WORKING_POINTS
@@ -32,7 +31,7 @@ def regions_on(target: MeshTarget, kind: SurfaceKind) -> Callable[[str], RegionM
     """
     if kind == "mesh":
         mesh = TargetMesh.from_mesh(Mesh(target.vertices, target.faces))
-        face = _nearest_face(target, mesh.vertices[mesh.faces].mean(axis=1))
+        face = target.nearest_faces(mesh.vertices[mesh.faces].mean(axis=1))
         return lambda name: RegionMesh.from_faces(mesh, target.regions[name][face])
     if kind == "votes":
         mesh = TargetMesh.from_mesh(Mesh(target.vertices, target.faces))
@@ -57,10 +56,3 @@ def scan_of(target: MeshTarget) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     kept = rng.permutation(len(scan.face))[:SCAN_POINTS]
     points = scan.cloud.points[kept]
     return points, estimate_normals(points, sensors=scan.cloud.sensors), scan.face[kept]
-
-
-def _nearest_face(target: MeshTarget, points: np.ndarray) -> np.ndarray:
-    vertices, faces = np.ascontiguousarray(target.vertices), np.ascontiguousarray(target.faces)
-    tree = igl.AABB()
-    tree.init(vertices, faces)
-    return np.asarray(tree.squared_distance(vertices, faces, np.ascontiguousarray(points))[1])

@@ -12,9 +12,11 @@ from scipy.spatial import cKDTree
 
 from nrdf.geometry.polylines import step_lengths
 from nrdf.surface.given_surface import MeshSurface
+from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 from nrdf_benchmark.mesh_paths.line_spacing import ALIKE, Line, line_spacing
+from nrdf_benchmark.mesh_paths.region_shape import RegionMatch, is_curved, parts_in_space
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, face_components
 
 _LEAST_STEP_M = 1e-4  # that a turn is divided by
@@ -35,6 +37,10 @@ class MeshPathMetrics:
     them; short_strokes: shorter than the tool's radius; needless_strokes: those of them that cover
     less than 2 % of the region. surface_m, air_m: way on the surface, and off it.
     fits: whether the footprint fits into the region somewhere. area_m2: of the visible region.
+    parts: its parts, in space, that are no smaller than the footprint, at least 1. curved: whether
+    its sides bend under the tool. left_out, unreached: shares of it without a stroke, outside
+    the region that was planned on and inside it. border_ratio: length of the border that was
+    planned with, for that of the given region; iou: of the two regions; None where they are one.
     """
 
     distance_99_m: float
@@ -53,6 +59,12 @@ class MeshPathMetrics:
     air_m: float
     fits: bool
     area_m2: float
+    parts: int = 1
+    curved: bool = False
+    left_out: float = 0.0
+    unreached: float = 0.0
+    border_ratio: float | None = None
+    iou: float | None = None
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -61,9 +73,16 @@ class MeshPathMetrics:
 
 
 def measure_mesh_path(
-    target: MeshTarget, region: str, segments: Sequence[Segment], strategy: Strategy
+    target: MeshTarget,
+    region: str,
+    segments: Sequence[Segment],
+    strategy: Strategy,
+    planned: RegionMesh | None = None,
 ) -> MeshPathMetrics:
-    """Measure what a planner made of one region; at least one process segment."""
+    """Measure what a planner made of one region; at least one process segment.
+
+    planned: the region that was planned on, where it was found, and not given.
+    """
     work = [segment for segment in segments if segment.kind == "process"]
     contacts = [s.positions + strategy.standoff_m * s.axes for s in work]
     axes = [s.axes for s in work]
@@ -79,6 +98,9 @@ def measure_mesh_path(
     lengths = np.array([float(step.sum()) for step in steps])
     short = lengths < strategy.tool_radius_m
     shares = np.array([len(one) for one in covered]) / len(points)
+    reached = np.zeros(len(points), bool)
+    reached[np.concatenate(covered)] = True
+    found = RegionMatch.of(target, region, planned)
     apart = line_spacing(lines, strategy.stepover_m, points, normals, target.point_area_m2)
     apart = apart / strategy.stepover_m
     return MeshPathMetrics(
@@ -87,7 +109,7 @@ def measure_mesh_path(
         step_worst=float(every_step.max() / strategy.spacing_m),
         steps_above=int((every_step > 2.0 * strategy.spacing_m).sum()),
         turn_worst_rad_m=float(np.concatenate([*turns, np.zeros(1)]).max()),
-        coverage=len(np.unique(np.concatenate(covered))) / len(points),
+        coverage=float(reached.mean()),
         spacing_even=float(((apart >= 0.85) & (apart <= 1.15)).mean()) if len(apart) else None,
         spacing_worst=float(apart.max()) if len(apart) else None,
         strokes=len(work),
@@ -98,6 +120,12 @@ def measure_mesh_path(
         air_m=_air(segments),
         fits=footprint_fits(target, region, strategy.tool_radius_m),
         area_m2=len(points) * target.point_area_m2,
+        parts=parts_in_space(points, target.point_area_m2, strategy.tool_radius_m),
+        curved=is_curved(points, normals, strategy.tool_radius_m),
+        left_out=float((~found.inside & ~reached).mean()),
+        unreached=float((found.inside & ~reached).mean()),
+        border_ratio=found.border_ratio,
+        iou=found.iou,
     )
 
 

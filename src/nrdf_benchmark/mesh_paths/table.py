@@ -32,18 +32,27 @@ class MeshRow:
 @dataclass(frozen=True)
 class _Figure:
     """A figure of a region. value: None where it has none; least: whether the value must be at
-    least the limit, instead of at most."""
+    least the limit, instead of at most. roles, planners: of regions with those names, and of those
+    that were planned so, where it is not of all."""
 
     name: str
     bar: str
     limit: float
     value: Callable[[MeshPathMetrics], float | None]
     least: bool = False
+    roles: tuple[str, ...] = ()
+    planners: tuple[str, ...] = ()
 
 
+PLATES = ("seat", "back", "top", "shelf", "bonnet", "roof", "door", "all")
+RODS = ("leg", "rail", "arm")
 FIGURES = (
     _Figure("contacts from given mesh, 99 %, mm", "<= 0.1", 0.1, lambda m: 1e3 * m.distance_99_m),
     _Figure("contacts, worst, mm", "<= 0.5", 0.5, lambda m: 1e3 * m.distance_worst_m),
+    _Figure("left out of the region, %", "", np.inf, lambda m: 100.0 * m.left_out),
+    _Figure("unreached in it, %", "<= 1", 1.0, lambda m: 100.0 * m.unreached),
+    _Figure("border for the true one's", "<= 1.1", 1.1, lambda m: m.border_ratio),
+    _Figure("IoU with the true region, %", "", 0.0, lambda m: m.iou and 100.0 * m.iou, True),
     _Figure("largest step, spacings", "<= 2", 2.0 + 1e-6, lambda m: m.step_worst),
     _Figure(
         "turn of the axis, degrees a mm", "<= 3", 3.0 + 1e-6,
@@ -56,6 +65,9 @@ FIGURES = (
     ),
     _Figure("widest spacing, stepovers", "<= 1.3", 1.3, lambda m: m.spacing_worst),
     _Figure("strokes of a region", "", np.inf, lambda m: float(m.strokes)),
+    _Figure("strokes of a plate or back", "1", 1.0, lambda m: m.strokes / m.parts, roles=PLATES),
+    _Figure("strokes of a leg or rail", "<= 8", 8.0, lambda m: m.strokes / m.parts, roles=RODS),
+    _Figure("strokes of a spiral", "1", 1.0, lambda m: m.strokes / m.parts, planners=("spiral",)),
     _Figure("median stroke, region's lengths", ">= 0.6", 0.6, lambda m: m.stroke_ratio, True),
     _Figure("strokes under the tool's radius", "", np.inf, lambda m: float(m.short_strokes)),
     _Figure("of them needless", "0", 0.0, lambda m: float(m.needless_strokes)),
@@ -66,10 +78,16 @@ FIGURES = (
 
 def mesh_rows(results: Sequence[MeshPathResult]) -> list[MeshRow]:
     """A row for each figure, over all regions that have a path."""
-    planned = [result.metrics for result in results if result.metrics is not None]
     rows = []
     for figure in FIGURES:
-        values = np.array([v for m in planned if (v := figure.value(m)) is not None])
+        asked = [
+            result.metrics
+            for result in results
+            if result.metrics is not None
+            and (not figure.roles or result.region in figure.roles)
+            and (not figure.planners or result.planner in figure.planners)
+        ]
+        values = np.array([v for m in asked if (v := figure.value(m)) is not None])
         if not len(values):
             continue
         met = values >= figure.limit if figure.least else values <= figure.limit
@@ -87,9 +105,13 @@ def totals(results: Sequence[MeshPathResult]) -> str:
     air = sum(m.air_m for m in planned)
     strokes = sum(m.strokes for m in planned)
     seconds = sum(result.seconds for result in results)
+    needless = sum(m.needless_strokes for m in planned)
+    ratios = [m.stroke_ratio for m in planned for _ in range(m.strokes)]
     return (
         f"{len(planned)} of {len(results)} regions planned: {strokes} strokes, {surface:.1f} m on "
         f"the surface, {air / max(surface, 1e-9):.2f} m of air for each (bar 0.5), "
+        f"{needless} needless strokes (bar 0), median stroke {np.median(ratios or [0]):.2f} of its "
+        f"region's length (bar 0.6), "
         f"{8.0 * seconds / max(len(results), 1):.1f} s of CPU time for 8 regions"
     )
 
@@ -109,9 +131,14 @@ def markdown(results: Sequence[MeshPathResult], title: str) -> str:
 def selections(
     results: Sequence[MeshPathResult],
 ) -> list[tuple[str, list[MeshPathResult]]]:
-    """All regions, and those that the tool's footprint fits into."""
-    fitting = [result for result in results if result.metrics is not None and result.metrics.fits]
-    return [("all regions", list(results)), ("those that the footprint fits into", fitting)]
+    """All regions; those that the tool's footprint fits into; flat and curved ones."""
+    planned = [(result, result.metrics) for result in results if result.metrics is not None]
+    return [
+        ("all regions", list(results)),
+        ("those that the footprint fits into", [r for r, m in planned if m.fits]),
+        ("flat ones", [r for r, m in planned if not m.curved]),
+        ("curved ones", [r for r, m in planned if m.curved]),
+    ]
 
 
 def to_csv(results: Sequence[MeshPathResult]) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 
+import igl
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -60,6 +61,13 @@ class MeshTarget:
     def indices(self, region: str) -> np.ndarray:
         """Which of the skin's points (k,) lie on a region."""
         return np.flatnonzero(self.regions[region][self.skin.face])
+
+    def nearest_faces(self, points: np.ndarray) -> np.ndarray:
+        """The face (m,) nearest to each of points (m, 3), m."""
+        vertices, faces = np.ascontiguousarray(self.vertices), np.ascontiguousarray(self.faces)
+        tree = igl.AABB()
+        tree.init(vertices, faces)
+        return np.asarray(tree.squared_distance(vertices, faces, np.ascontiguousarray(points))[1])
 
     @cached_property
     def visible_regions(self) -> tuple[str, ...]:

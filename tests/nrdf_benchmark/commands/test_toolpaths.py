@@ -33,13 +33,13 @@ def test_meshes_are_measured_beside_the_bars(monkeypatch, capsys, tmp_path):
     trimesh.creation.box((1.0, 0.4, 0.1)).export(tmp_path / "plate.ply")
     monkeypatch.setattr(
         "nrdf_benchmark.mesh_paths.evaluate._on_mesh",
-        lambda target, planner, strategy, surface: lambda region: rows_on_top([0.0, 0.025]),
+        lambda target, planner, strategy, surface: lambda region: (rows_on_top([0.0, 0.025]), None),
     )
     out = tmp_path / "out"
     given = ["eval", "toolpaths", "--meshes", str(tmp_path / "plate.ply"), "--out", str(out)]
     assert cli.run(given) == 0
     shown = capsys.readouterr().out
-    assert "planner raster: all regions, 1" in shown.replace("\n", " ").replace("  ", " ")
+    assert "planner auto: all regions, 1" in shown.replace("\n", " ").replace("  ", " ")
     assert "contacts from given mesh, 99 %, mm" in shown and "<= 0.1" in shown
     assert sorted(path.suffix for path in out.glob("toolpaths.*")) == [".csv", ".json", ".md"]
 

@@ -7,7 +7,7 @@ import pytest
 from builders.mesh_targets import plate_target, rows_on_top
 from nrdf.errors import DataError, ProcessError
 from nrdf_benchmark.mesh_paths import evaluate
-from nrdf_benchmark.mesh_paths.evaluate import evaluate_mesh_paths
+from nrdf_benchmark.mesh_paths.evaluate import evaluate_mesh_paths, usual_planner
 from nrdf_benchmark.mesh_paths.targets import TargetSource
 from nrdf_benchmark.result_cache import LineCache
 
@@ -23,7 +23,7 @@ def planned(monkeypatch):
     asked = []
 
     def make(target, planner, strategy, surface):
-        return lambda region: asked.append(region) or rows_on_top([-0.05, -0.025, 0.0])
+        return lambda region: asked.append(region) or (rows_on_top([-0.05, -0.025, 0.0]), None)
 
     monkeypatch.setattr(evaluate, "_on_mesh", make)
     return asked
@@ -68,3 +68,8 @@ def test_planners_are_told_by_name(source):
     assert result.metrics.distance_worst_m < 1e-6 and result.metrics.coverage > 0.99
     assert result.metrics.step_worst <= 2.0
     assert result.metrics.strokes == 1  # joined on the surface
+
+
+def test_the_usual_planner_follows_legs_and_rasters_seats():
+    assert {usual_planner(name) for name in ("leg", "rail", "arm")} == {"rod"}
+    assert {usual_planner(name) for name in ("seat", "back", "top", "bonnet")} == {"raster"}

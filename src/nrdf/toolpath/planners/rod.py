@@ -40,7 +40,7 @@ _STRAIGHT = 2.0  # thicknesses: sections that differ over less don't lead stroke
 _STEP = 2.0  # spacings: a longer step lifts the tool
 _SHARES = 120  # places around a section at which its sides are told apart
 _CORNER, _NEAR = 0.7, 0.04  # cosine of a turn within twice that share of a section: a corner
-_MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.1, 0.9, 0.15
+_MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.14, 0.9, 0.15
 """Stepovers: between strokes of one side, and the narrowest side that has a stroke."""
 _AWAY = 0.4  # stepovers from where a stroke should be: there is no surface
 _PART = 0.8  # of the usual section's length: what is shorter is cut at an end
