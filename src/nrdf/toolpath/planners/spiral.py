@@ -19,6 +19,7 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.contour import ring_lines
 from nrdf.toolpath.planners.field_lines import Part, checked, parts_of
 from nrdf.toolpath.planners.ordering import snake_order
+from nrdf.toolpath.planners.steady_spiral import steady_spiral
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -29,9 +30,10 @@ _FINE = 0.125  # of a stepover: between points of rings, before they are joined
 def plan_spiral(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """One stroke for each part whose rings lie within one another; more where rings part.
 
-    Once around along the outermost ring, then at every turn evenly from one ring to the next, at
-    last once around the innermost. Rings: lines at even distances from the border, as of
-    `nrdf.toolpath.planners.contour`. Raises ProcessError for a margin that leaves nothing.
+    From the border inward, at every turn evenly one stepover farther from it. A tool with a radius
+    below the stepover goes along the border first. Around holes, and where rings part,
+    from one ring to the next, as of `nrdf.toolpath.planners.contour`. Raises ProcessError for a
+    margin that leaves nothing.
     """
     found: list[SurfacePath] = []
     for part in parts_of(region, strategy):
@@ -44,6 +46,9 @@ def plan_spiral(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
 
 def _spirals(part: Part, strategy: Strategy) -> list[np.ndarray]:
     """Lines (n, 3) near the part's surface."""
+    steady = steady_spiral(part, strategy)
+    if steady is not None:
+        return [steady]
     lines = [line for line in ring_lines(part, strategy) if line.closed]
     rings = [resample(line.points, _FINE * strategy.stepover_m) for line in lines]
     nested = _nested(rings, [line.level for line in lines])
