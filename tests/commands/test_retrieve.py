@@ -135,7 +135,7 @@ def test_two_regions_of_one_name_are_refused(retrieve, chair_files, capsys):
 def test_unknown_model_lists_the_known(retrieve, tmp_path, capsys):
     assert retrieve(model=["chiar"]) == 2
     said = capsys.readouterr().err
-    assert "no model 'chiar'; known: " in said
+    assert "no model 'chiar'; did you mean 'chair'? " in said
     assert all(entry.name in said for entry in list_models())
     assert list(tmp_path.iterdir()) == []
 

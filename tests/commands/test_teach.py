@@ -19,13 +19,19 @@ def test_a_placeholder_says_what_to_do(box_files, capsys):
     assert cli.run([*words.split(), "--overwrite"]) == 0
 
 
-def test_new_takes_an_unusual_category_where_it_is_meant(box_files, capsys):
-    words = f"teach --reference {box_files}/box.ply --category sofa --out {box_files}/sofa.yaml"
-    words += f" --region {box_files}/top.ply"
-    assert cli.run(words.split()) == 2
-    assert "--model" in capsys.readouterr().err and not (box_files / "sofa.yaml").exists()
-    assert cli.run([*words.split(), "--allow-unusual"]) == 0
+def test_a_new_category_is_served_by_registration_and_a_misspelt_one_is_asked_back(
+    box_files, capsys
+):
+    words = f"teach --reference {box_files}/box.ply --out {box_files}/sofa.yaml"
+    words += f" --region {box_files}/top.ply --category"
+    assert cli.run([*words.split(), "chiar"]) == 2
+    assert "did you mean 'chair'?" in capsys.readouterr().err
+    assert not (box_files / "sofa.yaml").exists()
+    assert cli.run([*words.split(), "sofa"]) == 0
+    assert "found by registration" in " ".join(capsys.readouterr().err.split())
+    assert "model: registration" in (box_files / "sofa.yaml").read_text()
     assert cli.run(["check", str(box_files / "sofa.yaml")]) == 0
+    assert cli.run([*words.split(), "chiar", "--allow-unusual", "--overwrite"]) == 0
 
 
 def test_json_and_its_schema(taught, tmp_path, capsys):

@@ -42,9 +42,10 @@ def test_second_model_joins_and_same_name_replaces(stocked, untrained):
 
 
 def test_unknown_model_lists_the_known(stocked):
-    with pytest.raises(
-        ModelError, match=r"no model 'chiar'; known: chair, registration; or give the path"
-    ):
+    message = (
+        r"no model 'chiar'; did you mean 'chair'\? \(known: chair, registration\); registration "
+    )
+    with pytest.raises(ModelError, match=message):
         find_weights("chiar", stocked)
 
 
@@ -118,3 +119,10 @@ def test_a_name_that_is_no_files_is_refused(stocked, untrained, name):
     with pytest.raises(ModelError, match="is no name for a model: "):
         add_to_zoo(untrained, name=name, zoo=stocked)
     assert sorted(p.name for p in stocked.parent.rglob("*")) == before
+
+
+def test_registration_has_no_weights(stocked):
+    field, metadata = load_field("registration", stocked)
+    assert (field.preset, metadata["category"]) == ("registration", "")
+    with pytest.raises(ModelError, match="the model registration has no weights"):
+        find_weights("registration", stocked)

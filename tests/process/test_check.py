@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from builders.taught_box import SAND, bound_knowledge, cloud, solid
-from nrdf.errors import ProcessError
 from nrdf.io.cloud import PointCloud
-from nrdf.process import check
-from nrdf.process.check import check_category, check_knowledge
+from nrdf.process.check import check_knowledge
 
 
 def checked(reference=None, name="top", **changes):
@@ -88,10 +86,3 @@ def test_spirals_and_contours_have_no_wide_gaps_in_corners(trajectory):
 def test_a_plate_is_covered_whole(trajectory):
     row = checked(solid(), trajectory=trajectory)
     assert row.metrics.coverage > 0.999 and row.metrics.true_distance_worst_m < 1e-6
-
-
-def test_a_category_of_ones_own_is_right_where_a_model_is_given(untrained, monkeypatch):
-    monkeypatch.setattr(check, "known_categories", lambda: ["car"])
-    check_category("chair", untrained)
-    with pytest.raises(ProcessError, match="known: car"):
-        check_category("chair")

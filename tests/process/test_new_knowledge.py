@@ -91,14 +91,16 @@ def test_mistakes_are_explained(files):
         new(files, "off")
 
 
-def test_a_category_that_no_model_is_for_is_offered_the_nearest(files, untrained):
+def test_the_model_is_named_where_it_is_not_the_categorys_own(files, untrained):
     reference = files / "scans" / "box.ply"
-    message = r"no model for the category 'chiar'; did you mean 'chair'\? \(known: car, chair"
-    with pytest.raises(ProcessError, match=message):
+    with pytest.raises(ProcessError, match=r"did you mean 'chair'\?"):
         new_knowledge(reference, "chiar", files)
     meant = new_knowledge(reference, "chiar", files, allow_unusual=True, unit="m")
-    assert meant.allow_unusual and meant.category == "chiar"
-    assert not new_knowledge(reference, "chair", files).allow_unusual
-    assert not new_knowledge(reference, "table", files).allow_unusual  # a family, to train with
+    assert (meant.category, meant.model, meant.allow_unusual) == ("chiar", "registration", True)
+    assert new_knowledge(reference, "chair", files).model is None
+    assert new_knowledge(reference, "chair", files, model="registration").model == "registration"
+    assert new_knowledge(reference, "chair", files, model=str(untrained)).model is None
+    helmet = new_knowledge(reference, "helmet", files, unit="m")
+    assert helmet.model == "registration" and not helmet.allow_unusual
     with pytest.raises(ProcessError, match=r"category is 'chiar', but the model .* is for chair"):
         new_knowledge(reference, "chiar", files, model=str(untrained), allow_unusual=True)

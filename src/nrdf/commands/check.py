@@ -27,12 +27,14 @@ def check(file: Positional[File], model: str | None = None) -> None:
 
     Args:
         file: The knowledge file, YAML or JSON.
-        model: Weight file or training run for a category that the zoo has no model for.
+        model: Zoo name, weight file or run, or registration; what the file says, or the category's,
+            unless given.
     """
     from nrdf.errors import ProcessError
     from nrdf.process.bound_knowledge import read_bound_knowledge
-    from nrdf.process.check import check_category, check_knowledge
+    from nrdf.process.check import check_knowledge
     from nrdf.process.knowledge_file import listed
+    from nrdf.process.model_choice import choose_model
 
     bound = read_bound_knowledge(file)
     with progress_bar("planning on the reference") as progress:
@@ -53,8 +55,9 @@ def check(file: Positional[File], model: str | None = None) -> None:
             errors.print(f"{row.where}: {warning}", style="yellow")
     faults = [f"{row.where}: {row.fault}" for row in checked if row.fault]
     try:
-        if model is not None or not bound.knowledge.allow_unusual:
-            check_category(bound.knowledge.category, model)
+        said = bound.knowledge
+        chosen = choose_model(said.category, model or said.model, said.allow_unusual)
+        console.print(chosen.note or f"its regions are found with the model {chosen.name}")
     except ProcessError as error:
         faults.insert(0, f"category: {error}")
     if faults:

@@ -58,8 +58,8 @@ def retrieve(
 ) -> int:
     """Find the regions of a reference object on a target object.
 
-    Both are of the category that the model is for. With --up the target is a scan in any pose: it
-    is cleaned and aligned first, as by `nrdf align`.
+    Both are of the category that the model is for, or, with --model registration, of any one. With
+    --up the target is a scan in any pose: it is cleaned and aligned first, as by `nrdf align`.
 
     Writes into the output folder: for each region a PLY of the target's own points in it, with
     confidence (0 to 1) and index (into the target) as properties; report.json; picture.png. All
@@ -71,7 +71,8 @@ def retrieve(
     new.ply
 
     Args:
-        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder.
+        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder; or
+            registration, which serves any category.
         reference: Cloud or mesh of the object on which the regions are known: +X forward, +Y up;
             any unit, scale and place.
         region: One file a region, named by it: a cloud whose points lie on the reference, a .npy of

@@ -59,8 +59,10 @@ class TransferRun:
     @cached_property
     def model(self) -> Model:
         import nrdf
+        from nrdf.process.model_choice import model_name_for
 
-        return nrdf.load_model(self.model_name or self.category, self.device)
+        name = self.model_name or model_name_for(self.bound.knowledge)
+        return nrdf.load_model(name, self.device)
 
     @cached_property
     def process_transfer(self) -> ProcessTransfer:

@@ -16,13 +16,14 @@ from typing import Any
 
 from pydantic import ConfigDict, TypeAdapter
 
-from nrdf.errors import ModelError, OutputError, unknown_name
+from nrdf.errors import ModelError, OutputError
 from nrdf.field.base import Field
 from nrdf.field.registration import METADATA, REGISTRATION, RegistrationField
 from nrdf.field.weights import load_weights, read_metadata
 from nrdf.io.atomic import write_atomically
 from nrdf.io.file_names import file_name_problem
 from nrdf.io.files import read_file
+from nrdf.io.schema import suggest_name
 
 log = logging.getLogger(__name__)
 
@@ -102,10 +103,10 @@ def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
         return path
     if str(name) == REGISTRATION:
         raise ModelError(f"the model {REGISTRATION} has no weights; name a trained one here")
-    known = [*models, REGISTRATION]
+    hint = suggest_name(str(name), [*models, REGISTRATION])
     raise ModelError(
-        f"{unknown_name('model', str(name), known)}; or give the path of a weight file "
-        "(.safetensors) or of a finished training run's folder"
+        f"no model '{name}'{hint}; {REGISTRATION} serves any category; or give the path of a "
+        "weight file (.safetensors) or of a finished training run's folder"
     )
 
 

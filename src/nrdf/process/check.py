@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.units import readable
-from nrdf.io.schema import suggest_name
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
@@ -107,35 +105,4 @@ def _check_spacing(region: RegionMesh, process: Process) -> None:
         raise ProcessError(
             f"spacing_m is {spacing}, longer than the region, {readable('length_m', length)}; give "
             "less, or set allow_unusual: true in the process"
-        )
-
-
-def known_categories() -> list[str]:
-    """Categories of the models in the zoo and of the parametric families."""
-    from nrdf.field.zoo import list_models
-    from nrdf.shapes.families import FAMILY_NAMES
-
-    return sorted({entry.category for entry in list_models()} | set(FAMILY_NAMES))
-
-
-def check_category(category: str, model: str | Path | None = None) -> None:
-    """Raise ProcessError, with the nearest known name, for a category without a model.
-
-    model: zoo name, weight file or run, which must be for the category; ModelError where it cannot
-    be read.
-    """
-    if model is not None:
-        from nrdf.field.weights import read_metadata
-        from nrdf.field.zoo import find_weights
-
-        found = read_metadata(find_weights(model))["category"]
-        if found != category:
-            raise ProcessError(f"category is '{category}', but the model {model} is for {found}")
-        return
-    known = known_categories()
-    if category not in known:
-        raise ProcessError(
-            f"no model for the category '{category}'{suggest_name(category, known)}. With a model "
-            "of your own give --model; if it is meant all the same, set allow_unusual: true at the "
-            "top of the file (nrdf teach --allow-unusual)"
         )

@@ -113,11 +113,15 @@ class Knowledge(Quantities):
     version: Literal[1] = VERSION
     """Version of this format."""
     category: Name
-    """What the object is: chair, car, plane, or what the model was trained on."""
+    """What the object is, in your own words; chair, car and plane have a trained model."""
+    model: Name | None = None
+    """Model that finds the regions: a name in the zoo, or registration, which serves any category;
+    the category's own unless given, and registration where it has none."""
     reference: Reference
     """The object that it was taught on."""
     allow_unusual: bool = False
-    """Whether a category that no model is known for is meant; a process says so of its values."""
+    """Whether a category that is nearly called like a known one is meant; a process says so of its
+    values."""
     allow_overlap: bool = False
     """Whether regions may have points in common."""
     regions: list[Region] = Field(min_length=1, max_length=500)

@@ -12,9 +12,9 @@ from nrdf.errors import ProcessError, unknown_name
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.process.bound_knowledge import checksum, known_unit, overlaps, resolve
-from nrdf.process.check import check_category, known_categories
 from nrdf.process.knowledge import Knowledge
 from nrdf.process.knowledge_file import validated
+from nrdf.process.model_choice import choose_model
 from nrdf.process.process import Kind
 from nrdf.regions.files import read_regions
 
@@ -78,8 +78,8 @@ def new_knowledge(
 
     regions: region files, warned about where they overlap; without them there is one placeholder,
     whose file has still to be made. kinds: of the process on each region, or one for all. unit:
-    of the reference, where its file does not say. model: of the category, where the zoo has none.
-    allow_unusual: take a category that no model is known for.
+    of the reference, where its file does not say. model: of the category, instead of the zoo's.
+    allow_unusual: take a category that is nearly called like a known one.
 
     Raises ProcessError for an unknown kind or category, kinds that do not fit the regions and an
     unknown unit; RegionError and CloudError for files that cannot be read, or regions that are not
@@ -88,8 +88,10 @@ def new_knowledge(
     for kind in kinds:
         if kind not in KINDS:
             raise ProcessError(unknown_name("process kind", kind, KINDS))
-    if model is not None or not allow_unusual:
-        check_category(category, model)
+    chosen = choose_model(category, model, allow_unusual)
+    if chosen.note:
+        log.info("%s", chosen.note)
+    named = chosen.name != category and not Path(chosen.name).exists()
     cloud = read_cloud(reference)
     check_cloud(cloud, MINIMUM_POINTS)
     known = known_unit(cloud, unit, category, str(reference), "--unit")
@@ -105,7 +107,8 @@ def new_knowledge(
     every = list(kinds) * (len(rows) // len(kinds))
     content = {
         "category": category,
-        "allow_unusual": category not in known_categories(),
+        "model": chosen.name if named else None,
+        "allow_unusual": allow_unusual,
         "reference": {
             "cloud": _relative(reference, folder),
             "sha256": checksum(reference),

@@ -33,6 +33,7 @@ from nrdf.process.bound_knowledge import (
     unit_and_warnings,
 )
 from nrdf.process.correspondence import Correspondence, ReferenceSurface
+from nrdf.process.model_choice import model_name_for
 from nrdf.process.object_regions import ObjectSurface, Votes, object_surface, reason, regions_on
 from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.target_paths import Step, TargetPaths
@@ -223,7 +224,8 @@ def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTr
 
     Args:
         knowledge: path of the knowledge file.
-        model: the knowledge's category in the zoo unless given.
+        model: the one that the knowledge names, or its category's, unless given; registration
+            where the category has none (`nrdf.process.model_choice`).
 
     Raises:
         ProcessError: knowledge is wrong somewhere; field and value are named.
@@ -231,8 +233,9 @@ def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTr
         ModelError: the model is of another category.
     """
     bound_knowledge = read_bound_knowledge(knowledge)
-    category = bound_knowledge.knowledge.category
-    return ProcessTransfer(bound_knowledge, load_model(category) if model is None else model)
+    if model is None:
+        model = load_model(model_name_for(bound_knowledge.knowledge))
+    return ProcessTransfer(bound_knowledge, model)
 
 
 def _marked_matches(

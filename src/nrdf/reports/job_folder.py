@@ -153,6 +153,7 @@ def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) 
     keys = ("command", "knowledge", "target", "model", "date")
     return Knowledge(
         category=knowledge.category,
+        model=knowledge.model,
         reference=reference,
         allow_unusual=knowledge.allow_unusual,
         allow_overlap=knowledge.allow_overlap or bool(overlaps(found)),

@@ -1,0 +1,87 @@
+"""Which model finds the regions of a knowledge: the named one, the category's, or registration.
+
+A category is free text. One that no model is known for is served by registration; but where its
+name is nearly that of a known one, it is taken for a slip of the pen, and asked back.
+"""
+
+from __future__ import annotations
+
+import difflib
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+from nrdf.errors import ProcessError
+from nrdf.field.registration import REGISTRATION
+from nrdf.field.weights import read_metadata
+from nrdf.field.zoo import find_weights, list_models
+from nrdf.process.knowledge import Knowledge
+from nrdf.shapes.families import FAMILY_NAMES
+
+log = logging.getLogger(__name__)
+
+_ALIKE = 0.65  # similarity of names from which one is taken for the other, misspelt
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """A model for a category. name: as `nrdf.load_model` takes it; note: a sentence to be shown
+    where registration stands in, "" otherwise."""
+
+    name: str
+    note: str = ""
+
+
+def known_categories() -> list[str]:
+    """Categories of the models in the zoo and of the parametric families."""
+    return sorted({entry.category for entry in list_models()} | set(FAMILY_NAMES))
+
+
+def choose_model(
+    category: str, model: str | Path | None = None, allow_unusual: bool = False
+) -> ModelChoice:
+    """The model for a category, or the one that is given for it.
+
+    model: zoo name, weight file or run, which must be for the category, or registration.
+    allow_unusual: the category is meant, even if it is nearly called like a known one.
+
+    Raises ProcessError for a model of another category, and, with the nearest known name, for a
+    category that looks misspelt; ModelError for a model that cannot be read.
+    """
+    if model == REGISTRATION:
+        return ModelChoice(REGISTRATION)
+    if model is not None:
+        found = read_metadata(find_weights(model))["category"]
+        if found != category:
+            raise ProcessError(
+                f"category is '{category}', but the model {model} is for {found}; give another, or "
+                f"{REGISTRATION}, which serves any category"
+            )
+        return ModelChoice(str(model))
+    models = {entry.name for entry in list_models() if entry.category == category}
+    if models:
+        return ModelChoice(category if category in models else min(models))
+    others = [name for name in known_categories() if name != category]
+    alike = difflib.get_close_matches(category.lower(), others, n=1, cutoff=_ALIKE)
+    if alike and category not in FAMILY_NAMES and not allow_unusual:
+        raise ProcessError(
+            f"no model for the category '{category}'; did you mean '{alike[0]}'? If it is another "
+            f"kind of object, --model {REGISTRATION} serves any category (in a knowledge file: "
+            f"model: {REGISTRATION})"
+        )
+    return ModelChoice(
+        REGISTRATION,
+        f"there is no model for the category '{category}': its regions are found by registration, "
+        "which serves any category",
+    )
+
+
+def model_name_for(knowledge: Knowledge) -> str:
+    """The model that a knowledge is transferred with; where registration stands in, it is logged.
+
+    Raises as `choose_model` does.
+    """
+    chosen = choose_model(knowledge.category, knowledge.model, knowledge.allow_unusual)
+    if chosen.note:
+        log.info("%s", chosen.note)
+    return chosen.name
