@@ -67,3 +67,12 @@ def test_a_single_part_is_left_as_it_is():
     vertices, faces = parts(SEAT)
     found = united(vertices, faces)
     assert found.faces is faces and found.covered == 0.0
+
+
+def test_what_is_seen_through_an_open_side_stays():
+    crate = box((1.0, 1.0, 1.0))
+    crate.update_faces(crate.face_normals[:, 2] < 0.5)  # the missing lid is a fifth of its area
+    vertices, faces = parts(crate, box((0.4, 0.4, 0.4)), box((0.2, 0.2, 2.0), (0.35, 0.35, 0.0)))
+    found = united(vertices, faces)
+    inner = (np.abs(found.vertices[found.faces]) < 0.2 + 1e-9).all(axis=(1, 2))
+    assert trimesh.Trimesh(found.vertices, found.faces[inner]).area == pytest.approx(6 * 0.16)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import igl
 import manifold3d
 import numpy as np
 
@@ -16,12 +17,16 @@ from nrdf.surface.mesh_sewing import (
     split_vertices,
     thickened,
 )
+from nrdf.surface.mesh_sight import Seen
 from nrdf.surface.mesh_slivers import without_slivers
 
 _CAP = 0.25  # of a part's area: holes that may be closed for telling inside from outside
 _THIN = 2e-6  # longest sides that a sheet is thick, for it to be cut
 _UNNAMED = 1 << 30  # numbers from here on are of faces that the mesh does not have
 _MOST_PARTS = 2000  # of a mesh; one with more is left as it is
+_ROUNDS = 4  # of unions, each with fewer parts than the one before
+_SEEN_LOST = 5e-4  # share of the places seen from outside that a union may lose
+_WITHIN = 0.5  # winding number within a capped part
 
 
 @dataclass(frozen=True)
@@ -42,57 +47,125 @@ def united(vertices: np.ndarray, faces: np.ndarray) -> United:
 
     vertices: (v, 3); faces: (f, 3), outward. Parts with small holes count as closed. What lies
     inside a closed part is removed, exactly where the surfaces cross; parts that touch become one.
+    Nothing that can be seen from outside goes: where it would, parts keep their holes open, and
+    those that lose something still are left as they are.
     """
     given = United(vertices, faces, np.arange(len(faces)), 0.0, 0)
     vertices, faces, origin = sewn_borders(vertices, faces)
     vertices, faces, source = crowded_edges_divided(vertices, faces)
     origin = origin[source]
-    solids, sheets, left = _bodies(vertices, faces)
-    if not solids or len(solids) + len(sheets) < 2:
+    parts = _parts(vertices, faces)
+    if not 1 < len(parts) <= _MOST_PARTS:
         return given
+    bodies = [_body(vertices, part, _CAP) for part in parts]
+    seen = Seen.of(vertices, faces, np.random.default_rng(0))
+    of_face = np.zeros(len(faces), np.int64)
+    for number, part in enumerate(parts):
+        of_face[part.name] = number
+    own = of_face[seen.faces]
+    for _ in range(_ROUNDS):
+        made = _union(vertices, faces, bodies)
+        if made is None:
+            break
+        lost = seen.lost(made.vertices, made.faces)
+        if lost.sum() <= _SEEN_LOST * len(lost):
+            covered = max(_area(given.vertices, given.faces) - _area(made.vertices, made.faces), 0)
+            return replace(made, origin=origin[made.origin], covered=float(covered))
+        hiding = _hiding(bodies, seen.points[lost], own[lost])
+        for number in hiding:
+            bodies[number] = _body(vertices, parts[number], 0.0)
+        for number in [] if hiding else np.unique(own[lost]):
+            bodies[number] = _Body(parts[number], None, None)
+    return given
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Faces (f, 3) that hang together, of the vertices (v,) of the mesh, and which faces (f,) of
+    the mesh they are."""
+
+    place: np.ndarray
+    faces: np.ndarray
+    name: np.ndarray
+    is_open: bool
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A part as a solid, or as a sheet with a back, or as neither. closed: vertices and faces of
+    the part with its holes capped, if it has some."""
+
+    part: _Part
+    solid: manifold3d.Manifold | None
+    sheet: manifold3d.Manifold | None
+    closed: tuple[np.ndarray, np.ndarray] | None = None
+
+
+def _parts(vertices: np.ndarray, faces: np.ndarray) -> list[_Part]:
+    opposite = paired_half_edges(vertices, faces)
+    part = part_numbers(opposite)
+    split, place = split_vertices(faces, opposite)
+    is_open = np.zeros(int(part.max()) + 1, bool)
+    is_open[part[np.flatnonzero(opposite < 0) // 3]] = True
+    order = np.argsort(part, kind="stable")
+    parts = []
+    for number, own in enumerate(np.split(order, np.cumsum(np.bincount(part))[:-1])):
+        used, local = np.unique(split[own], return_inverse=True)
+        parts.append(_Part(place[used], local.reshape(-1, 3), own, bool(is_open[number])))
+    return parts
+
+
+def _body(vertices: np.ndarray, part: _Part, cap: float) -> _Body:
+    """A part as a body; holes up to a share of its area are capped."""
+    places, faces = vertices[part.place], part.faces
+    closed = None
+    if not part.is_open:
+        solid = _manifold(places, faces, part.name)
+    else:
+        closed = capped(places, faces, cap) if cap else None
+        solid = _manifold(*closed, part.name) if closed else None
+    if solid is not None or closed is not None or not part.is_open:
+        sound = solid is not None and solid.volume() >= 0.0
+        return _Body(part, solid if sound else None, None, closed if sound else None)
+    thin = _THIN * float(np.ptp(vertices, axis=0).max())
+    sheet = _manifold(*thickened(places, faces, thin), part.name)
+    return _Body(part, None, sheet if sheet is not None and sheet.volume() >= 0.0 else None)
+
+
+def _union(vertices: np.ndarray, faces: np.ndarray, bodies: list[_Body]) -> United | None:
+    """The bodies as one surface; None where none is a solid, or nothing meets it."""
+    solids = [body.solid for body in bodies if body.solid is not None]
+    sheets = [body.sheet for body in bodies if body.sheet is not None]
+    if not solids or len(solids) + len(sheets) < 2:
+        return None
     union = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add)
     pieces = [_triangles(body) for body in (union, *(sheet - union for sheet in sheets))]
+    rest = [body.part.name for body in bodies if body.solid is None and body.sheet is None]
+    left = np.concatenate([np.zeros(0, np.int64), *rest])
     pieces.append((vertices, faces[left], left))
     shift = np.cumsum([0, *(len(piece[0]) for piece in pieces[:-1])])
     vertices = np.concatenate([piece[0] for piece in pieces])
     faces = np.concatenate([piece[1] + by for piece, by in zip(pieces, shift, strict=True)])
-    origin = origin[np.concatenate([piece[2] for piece in pieces])]
+    origin = np.concatenate([piece[2] for piece in pieces])
     vertices, faces, origin = without_slivers(vertices, faces, origin)
     used, faces = np.unique(faces, return_inverse=True)
-    vertices, faces = vertices[used], faces.reshape(-1, 3)
-    covered = _area(given.vertices, given.faces) - _area(vertices, faces)
-    return United(vertices, faces, origin, max(covered, 0.0), len(solids) + len(sheets))
+    return United(vertices[used], faces.reshape(-1, 3), origin, 0.0, len(solids) + len(sheets))
 
 
-def _bodies(
-    vertices: np.ndarray, faces: np.ndarray
-) -> tuple[list[manifold3d.Manifold], list[manifold3d.Manifold], np.ndarray]:
-    """The parts of a mesh that are closed and those that are open, the latter with a back, their
-    triangles named by their faces; and the faces (k,) of parts that are neither."""
-    opposite = paired_half_edges(vertices, faces)
-    part = part_numbers(opposite)
-    split, place = split_vertices(faces, opposite)
-    count = int(part.max()) + 1
-    order = np.argsort(part, kind="stable")
-    if not 1 < count <= _MOST_PARTS:
-        return [], [], order
-    solids: list[manifold3d.Manifold] = []
-    sheets: list[manifold3d.Manifold] = []
-    left = [np.zeros(0, np.int64)]
-    is_open = np.zeros(count, bool)
-    is_open[part[np.flatnonzero(opposite < 0) // 3]] = True
-    thin = _THIN * float(np.ptp(vertices, axis=0).max())
-    for number, own in enumerate(np.split(order, np.cumsum(np.bincount(part))[:-1])):
-        used, local = np.unique(split[own], return_inverse=True)
-        places, local = vertices[place[used]], local.reshape(-1, 3)
-        closed = capped(places, local, _CAP) if is_open[number] else (places, local)
-        shape = closed or thickened(places, local, thin)
-        body = _manifold(shape[0], shape[1], own)
-        if body is None or body.volume() < 0.0:
-            left.append(own)
-        else:
-            (solids if closed else sheets).append(body)
-    return solids, sheets, np.concatenate(left)
+def _hiding(bodies: list[_Body], points: np.ndarray, own: np.ndarray) -> list[int]:
+    """Which bodies with capped holes hold points (n, 3) of other parts, own (n,)."""
+    hiding = []
+    for number, body in enumerate(bodies):
+        if body.closed is None:
+            continue
+        vertices, faces = body.closed
+        low, high = vertices.min(axis=0), vertices.max(axis=0)
+        asked = points[((points > low) & (points < high)).all(axis=1) & (own != number)]
+        if len(asked):
+            winding = igl.winding_number(vertices, np.ascontiguousarray(faces), asked)
+            if (np.asarray(winding) > _WITHIN).any():
+                hiding.append(number)
+    return hiding
 
 
 def _manifold(
