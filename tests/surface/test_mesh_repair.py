@@ -50,3 +50,10 @@ def test_triangles_that_nearly_touch_are_sewn_together():
     vertices, skin, repairs = repaired_skin(corners, np.arange(len(corners)).reshape(-1, 3))
     assert trimesh.Trimesh(vertices, skin, process=False).is_watertight
     assert repairs == ("320 faces that touched no other sewn to their neighbours",)
+
+
+def test_random_triangles_are_refused_at_once():
+    rng = np.random.default_rng(0)
+    faces = np.array([rng.choice(50, 3, replace=False) for _ in range(5000)])
+    with pytest.raises(DataError, match=r"a straight line through it meets .* no surface"):
+        repaired_skin(rng.random((50, 3)), faces)

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 import trimesh
 
+from nrdf.surface.fine_mesh import edges_of
 from nrdf.surface.mesh_sewing import (
     capped,
     crowded_edges_divided,
+    each_once,
     paired_half_edges,
     part_numbers,
     sewn_borders,
+    sheets_apart,
     split_vertices,
     thickened,
 )
@@ -61,3 +64,23 @@ def test_a_sheet_gets_a_back():
     )
     body = trimesh.Trimesh(*thickened(*sheet, 0.01), process=False)
     assert body.is_watertight and body.volume == pytest.approx(0.01)
+
+
+def test_what_is_given_twice_is_left_once_and_back_to_back_is_not_twice():
+    faces = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0]])
+    assert each_once(faces).tolist() == [0, 2]
+
+
+def test_two_sheets_back_to_back_have_no_face_and_no_crowded_edge_in_common():
+    x, y = np.meshgrid(np.arange(3.0), np.arange(3.0))
+    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(9)], axis=1)
+    quads = np.array([[i, i + 1, i + 4, i + 3] for i in (0, 1, 3, 4)])
+    front = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    apart, faces = sheets_apart(vertices, np.concatenate([front, front[:, ::-1]]))
+    _, count = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)
+    assert (count == 1).all()
+    _, of_face = edges_of(faces)
+    assert np.bincount(of_face.ravel()).max() == 2
+    corners = apart[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.abs(cross[:, 2]).sum() / 2.0 == 8.0 and cross[:, 2].sum() == 0.0

@@ -12,7 +12,8 @@ from nrdf.errors import DataError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh, outer_skin
 from nrdf.geometry.winding import MeshWindingNumber
-from nrdf.surface.mesh_sewing import crowded_edges_divided, paired_half_edges, split_vertices
+from nrdf.surface.mesh_needles import without_needles
+from nrdf.surface.mesh_sewing import sheets_apart
 from nrdf.surface.mesh_union import united
 
 _VIEWED = 20_000  # points of the skin that say which way its parts look
@@ -24,6 +25,7 @@ _PLACES = np.array(
     [[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2], [5.6, 0.2, 0.2], [0.2, 5.6, 0.2], [0.2, 0.2, 5.6]]
 )
 _SAME_PLACE = 2e-6  # longest sides within which vertices of loose triangles are one
+_MOST_MET = 100.0  # faces that a line through a surface meets, on average
 _LOOSE, _MANY_LOOSE = 0.5, 10_000  # share and number of faces that touch no other: no surface
 
 
@@ -54,6 +56,12 @@ def repaired_skin(
             f"{loose} of its {len(faces)} triangles touch no other: that is no surface; "
             "merge its vertices, or give its points as a cloud"
         )
+    met = _met_by_lines(vertices, faces)
+    if met > _MOST_MET:
+        raise DataError(
+            f"a straight line through it meets {met:.0f} of its {len(faces)} triangles on average: "
+            "that is no surface; check its faces, or give its points as a cloud"
+        )
     before = faces
     faces = outer_skin(vertices, faces, _VIEWED, np.random.default_rng(0))[0]
     turned = int((faces != before).any(axis=1).sum())
@@ -70,12 +78,16 @@ def repaired_skin(
         raise DataError("no face of the mesh can be reached from outside")
     if hidden.any():
         repairs.append(_said(int(hidden.sum()), "inside the object", "removed"))
-    vertices, faces, _ = crowded_edges_divided(vertices, faces[~hidden])
+    faces = faces[~hidden]
     used = len(np.unique(faces))
-    split, place = split_vertices(faces, paired_half_edges(vertices, faces))
-    if len(place) > used:
-        repairs.append(f"{len(place) - used} vertices doubled where more than two faces met")
-    return vertices[place], split, tuple(repairs)
+    vertices, faces = sheets_apart(vertices, faces)
+    if len(vertices) > used:
+        repairs.append(f"{len(vertices) - used} vertices doubled where more than two faces met")
+    faces, _, cracks = without_needles(vertices, faces)
+    if cracks.any():
+        repairs.append(_said(int(cracks.sum()), "without area", "removed"))
+    kept, faces = np.unique(faces, return_inverse=True)
+    return vertices[kept], faces.reshape(-1, 3), tuple(repairs)
 
 
 def hidden_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -127,6 +139,14 @@ def _leaving(
         total[going] += np.sign(facing).astype(np.int64)
         origins[going] += (np.asarray(away)[hit] + step)[:, None] * ways
     return np.asarray(total > 0)
+
+
+def _met_by_lines(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """How many faces a line meets that meets the mesh's box, on average (Crofton's formula)."""
+    a, b, c = (vertices[corner] for corner in faces.T)
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0
+    x, y, z = np.ptp(vertices, axis=0)
+    return area / max(float(x * y + y * z + z * x), 1e-300)
 
 
 def _loose(faces: np.ndarray) -> int:

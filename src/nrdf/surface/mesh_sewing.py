@@ -15,6 +15,7 @@ from nrdf.surface.mesh_edges import boundary_loops, opposite_half_edges
 _SAME = 1e-5  # longest sides within which border vertices and border edges are one
 _MOST_BORDER = 50_000  # half-edges along borders; a mesh with more is not sewn
 _ROUNDS = 4  # of vertices set onto border edges
+_APART_ROUNDS = 6
 
 
 def paired_half_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -96,6 +97,37 @@ def split_vertices(faces: np.ndarray, opposite: np.ndarray) -> tuple[np.ndarray,
     place = np.zeros(int(number.max(initial=-1)) + 1, np.int64)
     place[number] = faces.reshape(-1)
     return number.reshape(-1, 3).astype(np.int64), place
+
+
+def each_once(faces: np.ndarray) -> np.ndarray:
+    """Which faces (k,) are left if those with the same corners, wound the same way, are one."""
+    turn = faces.argmin(axis=1)[:, None] + np.arange(3)
+    key = np.take_along_axis(faces, turn % 3, axis=1)
+    return np.asarray(np.sort(np.unique(key, axis=0, return_index=True)[1]))
+
+
+def sheets_apart(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and outward faces, of which no more than two have an edge and no two all corners.
+
+    Where more meet, edges are divided and vertices doubled; of two faces back to back, one gets
+    vertices of its own.
+    """
+    for _ in range(_APART_ROUNDS):
+        count = len(faces)
+        vertices, faces, _ = crowded_edges_divided(vertices, faces)
+        faces, place = split_vertices(faces, paired_half_edges(vertices, faces))
+        vertices = vertices[place]
+        once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+        back = np.ones(len(faces), bool)
+        back[once] = False
+        faces = faces.copy()
+        corners = faces[back].ravel()
+        faces[back] = len(vertices) + np.arange(len(corners)).reshape(-1, 3)
+        vertices = np.concatenate([vertices, vertices[corners]])
+        if len(faces) == count:
+            break
+    used, faces = np.unique(faces, return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3)
 
 
 def sewn_borders(

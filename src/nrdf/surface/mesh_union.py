@@ -11,6 +11,7 @@ import numpy as np
 from nrdf.surface.mesh_sewing import (
     capped,
     crowded_edges_divided,
+    each_once,
     paired_half_edges,
     part_numbers,
     sewn_borders,
@@ -148,6 +149,8 @@ def _union(vertices: np.ndarray, faces: np.ndarray, bodies: list[_Body]) -> Unit
     faces = np.concatenate([piece[1] + by for piece, by in zip(pieces, shift, strict=True)])
     origin = np.concatenate([piece[2] for piece in pieces])
     vertices, faces, origin = without_slivers(vertices, faces, origin)
+    once = each_once(faces)
+    faces, origin = faces[once], origin[once]
     used, faces = np.unique(faces, return_inverse=True)
     return United(vertices[used], faces.reshape(-1, 3), origin, 0.0, len(solids) + len(sheets))
 
