@@ -7,6 +7,7 @@ import trimesh
 from nrdf.errors import ProcessError
 from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
+from nrdf.surface.mesh_edges import boundary_loops
 from nrdf.surface.object_mesh import object_mesh
 
 BALL = trimesh.creation.icosphere(4, radius=0.4)
@@ -47,3 +48,14 @@ def test_a_cloud_becomes_a_mesh():
 def test_what_has_no_surface_is_refused(cloud, radius, message):
     with pytest.raises(ProcessError, match=message):
         object_mesh(cloud, radius)
+
+
+def test_points_far_apart_become_a_closed_mesh_and_an_open_plate_stays_open():
+    stick = trimesh.creation.box((0.4, 0.05, 0.05))
+    points, face = trimesh.sample.sample_surface(stick, 800, seed=0)
+    found = object_mesh(PointCloud(points, stick.face_normals[face], "m"), 0.02)
+    assert boundary_loops(found.faces) == []
+    rng = np.random.default_rng(0)
+    plate = np.column_stack([rng.uniform(0, 0.4, 900), rng.uniform(0, 0.3, 900), np.zeros(900)])
+    up = np.tile([0.0, 0.0, 1.0], (900, 1))
+    assert len(boundary_loops(object_mesh(PointCloud(plate, up, "m"), 0.02).faces)) == 1

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.io.cloud import PointCloud
+from nrdf.surface.mesh_edges import opposite_half_edges
+from nrdf.surface.poisson_mesh import poisson_mesh
 from nrdf.surface.scan_mesh import mesh_from_scan
 from nrdf.surface.target_mesh import TargetMesh
 
 _EDGES_PER_RADIUS = 5  # of the tool: finer than it can follow only costs time
+_ASKED, _NEIGHBOURS = 4000, 8  # points that a mesh is judged by; those that tell their spacing
+_OFF, _WORSE = 0.6, 0.02  # spacings from which a point has no surface; share of them that decides
 
 
 def object_mesh(cloud: PointCloud, tool_radius_m: float) -> TargetMesh:
@@ -17,8 +22,9 @@ def object_mesh(cloud: PointCloud, tool_radius_m: float) -> TargetMesh:
 
     A cloud that was sampled from a mesh (`cloud.mesh`) has that mesh's outer skin. Any other one
     has the mesh through its points (`nrdf.surface.scan_mesh`), with edges of a fifth of the
-    tool's radius, m, or of the distance between its points where that is more; holes stay open
-    where it has no points. `repairs` of what is returned says what was changed.
+    tool's radius, m; holes stay open where it has no points. Points that are farther apart than
+    that have the closed surface around them (`nrdf.surface.poisson_mesh`), unless its thin parts
+    vanish or the object is open. `repairs` of what is returned says what was changed.
 
     Raises ProcessError for a mesh that is no surface, a radius that is not above 0, and points
     that no surface can be made of: without normals, too few, or scattered.
@@ -37,4 +43,30 @@ def _of_points(cloud: PointCloud, edge_m: float) -> TargetMesh:
             "a mesh cannot be made of points without normals; estimate them first "
             "(nrdf.geometry.normals.estimate_normals)"
         )
-    return mesh_from_scan(cloud.points, cloud.normals, edge_m)
+    points, normals = cloud.points, cloud.normals
+    mesh = mesh_from_scan(points, normals, edge_m)
+    some = np.linspace(0, len(points) - 1, min(_ASKED, len(points))).astype(int)
+    away = cKDTree(points).query(points[some], [_NEIGHBOURS + 1])[0]
+    spacing = float(np.median(away)) * np.sqrt(np.pi / _NEIGHBOURS)
+    if spacing <= edge_m:
+        return mesh
+    try:
+        closed = poisson_mesh(points, normals)
+    except ProcessError:
+        return mesh
+    missed, border = [], []
+    for made in (closed, mesh):
+        off = made.nearest(points[some], normals[some]).distances
+        missed.append(float((off > _OFF * spacing).mean()))
+        border.append(_border_length(made))
+    good = border[0] <= border[1] and missed[0] <= missed[1] + _WORSE
+    return closed if good else mesh
+
+
+def _border_length(mesh: TargetMesh) -> float:
+    """Length, m, of the edges of a single face."""
+    start = mesh.faces.reshape(-1)
+    stop = np.roll(mesh.faces, -1, axis=1).reshape(-1)
+    alone = opposite_half_edges(mesh.faces) < 0
+    way = mesh.vertices[start[alone]] - mesh.vertices[stop[alone]]
+    return float(np.linalg.norm(way, axis=1).sum())

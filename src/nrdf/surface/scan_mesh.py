@@ -69,7 +69,7 @@ def _settled(
     """The mesh with its vertices on the surface itself, and its ends where the points end."""
     kind = igl.PER_VERTEX_NORMALS_WEIGHTING_TYPE_AREA
     outward = unit_vectors(np.nan_to_num(igl.per_vertex_normals(vertices, faces, kind)))
-    vertices, nearest, away = _on_surface(scan, tree, vertices, outward)
+    vertices, nearest, away = on_surface(scan, tree, vertices, outward)
     wide = np.maximum(scan.spacing, 0.8 * scan.cell)[nearest]
     good, area = _looking_out(scan, nearest, vertices, faces)
     faces = trimmed(faces, good, away / wide, area / wide[faces[:, 0]] ** 2)
@@ -92,7 +92,7 @@ def _looking_out(
     return (np.max(facing, axis=0) > 0.0) & (area > _NO_AREA * scan.cell**2), area
 
 
-def _on_surface(
+def on_surface(
     scan: ScanPoints, tree: cKDTree, vertices: np.ndarray, outward: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (v, 3) moved onto the surface of their side, to which normals `outward` (v, 3)
