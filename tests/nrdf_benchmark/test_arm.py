@@ -34,6 +34,8 @@ def report(achieved: float, reached: float = 0.97):
             "reached_share": reached,
             "collisions": 0,
             "force_within": 0.97,
+            "time_s": 200.0,
+            "planned_time_s": 176.0,
         },
         "speed": {"ik_ms_per_waypoint": 3.0, "times_real_time": 100.0},
     }

@@ -36,12 +36,13 @@ _THREADS = 4  # that plan: numpy leaves them little to do at once
 class TargetPaths:
     """What all paths on one target share.
 
-    given: the target as it was given, which paths are compared with.
+    given: the target as it was given, which paths are compared with. up: (3,) its upright axis.
     """
 
     reference: ReferencePaths
     correspondence: Correspondence
     given: GivenSurface
+    up: np.ndarray
 
     def all(
         self,
@@ -83,7 +84,7 @@ class TargetPaths:
                 segments = plan_on_mesh(found.mesh, strategy)
             else:
                 process, segments, warnings = self._warp(region, number, process, found.mesh)
-            metrics = measure_path(found.mesh, strategy, segments, self.given)
+            metrics = measure_path(found.mesh, strategy, segments, self.given, self.up)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)

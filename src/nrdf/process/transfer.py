@@ -138,7 +138,10 @@ class ProcessTransfer:
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
         correspondence = Correspondence(self.reference_surface, encoded)
-        target_paths = TargetPaths(self.reference_paths, correspondence, given_surface(complete))
+        up = np.eye(3)[1] if encoded.pose is None else encoded.pose.rotation[:, 1]
+        target_paths = TargetPaths(
+            self.reference_paths, correspondence, given_surface(complete), up
+        )
         paths = target_paths.all(self.steps(), found, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})

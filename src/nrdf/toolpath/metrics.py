@@ -13,6 +13,7 @@ from nrdf.geometry.frames import angles_between
 from nrdf.geometry.polylines import arc_length, step_lengths, total_length
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.cycle_time import estimate_cycle_time
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
 from nrdf.toolpath.line_spacing import line_spacing
 from nrdf.toolpath.region_samples import RegionSamples
@@ -47,7 +48,8 @@ class ToolPathMetrics:
     step, where steps of less than 1 mm count as 1 mm.
 
     process_length_m: of the process segments; path_length_m: of all, free moves between them
-    included; cycle_time_s: at the feeds given, dwells included.
+    included; cycle_time_s: dwells included; of an arm
+    (`nrdf.toolpath.cycle_time`) where it is known how the object stands, else at the feeds given.
     """
 
     coverage: float
@@ -77,12 +79,13 @@ def measure_path(
     strategy: Strategy,
     segments: Sequence[Segment],
     given: GivenSurface | None = None,
+    up: np.ndarray | None = None,
 ) -> ToolPathMetrics:
     """Metrics of `segments` on a region of an object's mesh.
 
     Samples of the region, each of which stands for the same area, tell what is covered. given: the
-    object itself, which the path is compared with. Raises ProcessError where there is no process
-    segment.
+    object itself, which the path is compared with. up: (3,) the object's upright axis, with
+    which an arm's cycle time is estimated. Raises ProcessError where there is no process segment.
     """
     work = [segment for segment in segments if segment.kind == "process"]
     if not work:
@@ -100,6 +103,8 @@ def measure_path(
     off, wrong = _fit(region, strategy, work, contacts)
     step, turn, bend = _jumps(work, contacts, axes)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)
+    if up is not None:
+        time = estimate_cycle_time(segments, region.parent, strategy.tool_radius_m, up).total_s
     shares = samples.coverage(counts > 0)
     made = ToolPathMetrics(
         coverage=shares.worked,

@@ -9,8 +9,10 @@ import numpy as np
 
 from nrdf.robot.model.tool import PAD_GIVE_M
 from nrdf.robot.planning.timing import STEP_S
+from nrdf.robot.simulation.job import SimulationJob
 from nrdf.robot.simulation.metrics import FORCE_BAND, VERDICTS
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
+from nrdf.toolpath.cycle_time import estimate_cycle_time
 
 COLUMNS = (
     "reached", "region worked · planned", "left out · unreached", "force", "within ±20 %",
@@ -38,13 +40,14 @@ NOTES = (
 
 def simulation_report(result: SimulationResult) -> dict[str, Any]:
     """Everything that report.json says of a simulation; SI."""
-    paths = [_path(path) for path in result.paths]
+    job = result.simulation_job
+    paths = [_path(path, _planned_seconds(path, job)) for path in result.paths]
     reached = sum(p["reached"] for p in paths)
     waypoints = sum(p["waypoints"] for p in paths)
     pressed = [p for p in paths if p["force"] is not None]
     contact = sum(p["force"]["seconds"] for p in pressed)
     within = sum(p["force"]["within"] * p["force"]["seconds"] for p in pressed)
-    placement, job = result.placement, result.simulation_job
+    placement = result.placement
     assumed = [f"{job.origin}; --up says otherwise"] if job.assumed else []
     used = sorted({a.turntable_index for p in result.paths for a in p.program.actions})
     simulated_s = sum(p["time_s"] for p in paths)
@@ -81,6 +84,7 @@ def simulation_report(result: SimulationResult) -> dict[str, Any]:
             "rejected": sum(len(p["rejected"]) for p in paths),
             "force_within": within / contact if contact else None,
             "time_s": simulated_s,
+            "planned_time_s": sum(p["planned_time_s"] for p in paths),
         },
         "speed": {
             "ik_ms_per_waypoint": 1e3 * kinematics / waypoints,
@@ -92,7 +96,14 @@ def simulation_report(result: SimulationResult) -> dict[str, Any]:
     }
 
 
-def _path(simulated: SimulatedPath) -> dict[str, Any]:
+def _planned_seconds(simulated: SimulatedPath, job: SimulationJob) -> float:
+    """The cycle time that was expected before the arm was planned."""
+    path, surface = simulated.path, job.surfaces.planned
+    up = job.upright[2]
+    return estimate_cycle_time(path.segments, surface, path.tool_radius_m, up).total_s
+
+
+def _path(simulated: SimulatedPath, planned_s: float) -> dict[str, Any]:
     metrics, path = simulated.metrics, simulated.path
     force = None
     if metrics.force_commanded_n is not None and metrics.force_mean_n is not None:
@@ -135,6 +146,7 @@ def _path(simulated: SimulatedPath) -> dict[str, Any]:
         "off_plan_99_m": metrics.off_plan_99_m,
         "slower_than_feed_share": metrics.slow_share,
         "time_s": metrics.cycle_time_s,
+        "planned_time_s": planned_s,
         "seconds": metrics.seconds,
         "collisions": [vars(collision) for collision in simulated.collisions],
         "rejected": [vars(collision) for collision in simulated.rejected],
