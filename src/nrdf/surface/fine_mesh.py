@@ -156,7 +156,7 @@ def refine(
         pairs, of_face = edges.pairs, edges.of_face
         long = np.zeros(len(pairs), bool)
         long[of_face[wanted[origin]]] = True
-        length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+        length = _length(vertices[pairs[:, 0]] - vertices[pairs[:, 1]])
         long &= length > edge_m
         busy = long[of_face].any(axis=1)
         inner = _Inner.of(vertices, faces, edges, flat)
@@ -249,13 +249,14 @@ class _Edges:
 @dataclass(frozen=True)
 class _Inner:
     """Edges (n,) between two faces f, g: a, b on the edge, c, d across; whether they lie flat, and
-    the larger height of the two triangles on the edge."""
+    the larger height of the two triangles on the edge. doubles (n, 2): twice their areas."""
 
     edge: np.ndarray
     faces: np.ndarray
     corners: np.ndarray
     flat: np.ndarray
     height: np.ndarray
+    doubles: np.ndarray
 
     @staticmethod
     def of(vertices: np.ndarray, faces: np.ndarray, edges: _Edges, limit: float) -> _Inner:
@@ -266,13 +267,14 @@ class _Inner:
         pa, pb, pc, pd = (vertices[corner] for corner in (a, b, c, d))
         side = pb - pa
         normal, beside = np.cross(side, pc - pa), np.cross(pd - pa, side)
-        size, other_size = np.linalg.norm(normal, axis=1), np.linalg.norm(beside, axis=1)
+        size, other_size = _length(normal), _length(beside)
         off = np.abs(np.einsum("ea,ea->e", normal, pd - pa)) / np.maximum(size, 1e-300)
         flat = (faces[g, other % 3] == b) & (off < limit) & (c != d)
         flat &= np.einsum("ea,ea->e", normal, beside) > 0.0
-        height = np.maximum(size, other_size) / np.maximum(np.linalg.norm(side, axis=1), 1e-300)
+        height = np.maximum(size, other_size) / np.maximum(_length(side), 1e-300)
         corners = np.stack([a, b, c, d], axis=1)
-        return _Inner(inner, np.stack([f, g], axis=1), corners, flat, height)
+        doubles = np.stack([size, other_size], axis=1)
+        return _Inner(inner, np.stack([f, g], axis=1), corners, flat, height, doubles)
 
 
 def _flipped(
@@ -282,10 +284,15 @@ def _flipped(
     less thin, and how many were: Delaunay's criterion, for edges that share no triangle."""
     edges = _Edges.of(faces)
     inner = _Inner.of(vertices, faces, edges, flat)
-    pa, pb, pc, pd = vertices[inner.corners].transpose(1, 0, 2)
-    wide = _angle(pa - pc, pb - pc) + _angle(pa - pd, pb - pd)
     alike = kind[inner.faces[:, 0]] == kind[inner.faces[:, 1]]
-    chosen = np.flatnonzero(inner.flat & alike & (wide > np.pi + 1e-6))
+    asked = np.flatnonzero(inner.flat & alike)
+    pa, pb, pc, pd = (vertices[corner] for corner in inner.corners[asked].T)
+    # The angles across the edge: their tangents are those of twice an area and a product.
+    one = np.einsum("ea,ea->e", pa - pc, pb - pc)
+    other = np.einsum("ea,ea->e", pa - pd, pb - pd)
+    size, other_size = inner.doubles[asked].T
+    wide = np.arctan2(size, one) + np.arctan2(other_size, other)
+    chosen, wide = asked[wide > np.pi + 1e-6], wide[wide > np.pi + 1e-6]
     if not len(chosen):
         return faces, 0
     # An edge that is there already would get more than two faces.
@@ -296,11 +303,11 @@ def _flipped(
     _, first = np.unique(c * count + d, return_index=True)
     new = np.zeros(len(chosen), bool)
     new[first] = there[place[first]] != (c * count + d)[first]
-    chosen = chosen[new]
+    chosen, wide = chosen[new], wide[new]
     # Each takes its two faces, the widest first.
     f, g = inner.faces[chosen].T
     rank = np.empty(len(chosen), int)
-    rank[np.argsort(-wide[chosen], kind="stable")] = np.arange(len(chosen))
+    rank[np.argsort(-wide, kind="stable")] = np.arange(len(chosen))
     taken = np.full(len(faces), len(chosen))
     np.minimum.at(taken, f, rank)
     np.minimum.at(taken, g, rank)
@@ -312,9 +319,8 @@ def _flipped(
     return faces, int(free.sum())
 
 
-def _angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    crossed = np.linalg.norm(np.cross(one, other), axis=1)
-    return np.arctan2(crossed, np.einsum("ea,ea->e", one, other))
+def _length(rows: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("ea,ea->e", rows, rows))
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
