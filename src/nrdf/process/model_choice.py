@@ -1,7 +1,7 @@
 """Which model finds the regions of a knowledge: the named one, the category's, or registration.
 
 A category is free text. One that no model is known for is served by registration; but where its
-name is nearly that of a known one, it is taken for a slip of the pen, and asked back.
+name is nearly that of one that has a model, it is taken for a slip of the pen, and asked back.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from nrdf.field.registration import REGISTRATION
 from nrdf.field.weights import read_metadata
 from nrdf.field.zoo import find_weights, list_models
 from nrdf.process.knowledge import Knowledge
-from nrdf.shapes.families import FAMILY_NAMES
 
 log = logging.getLogger(__name__)
 
@@ -30,11 +29,6 @@ class ModelChoice:
 
     name: str
     note: str = ""
-
-
-def known_categories() -> list[str]:
-    """Categories of the models in the zoo and of the parametric families."""
-    return sorted({entry.category for entry in list_models()} | set(FAMILY_NAMES))
 
 
 def choose_model(
@@ -58,12 +52,13 @@ def choose_model(
                 f"{REGISTRATION}, which serves any category"
             )
         return ModelChoice(str(model))
-    models = {entry.name for entry in list_models() if entry.category == category}
+    known = list_models()
+    models = {entry.name for entry in known if entry.category == category}
     if models:
         return ModelChoice(category if category in models else min(models))
-    others = [name for name in known_categories() if name != category]
+    others = sorted({entry.category for entry in known})
     alike = difflib.get_close_matches(category.lower(), others, n=1, cutoff=_ALIKE)
-    if alike and category not in FAMILY_NAMES and not allow_unusual:
+    if alike and not allow_unusual:
         raise ProcessError(
             f"no model for the category '{category}'; did you mean '{alike[0]}'? If it is another "
             f"kind of object, --model {REGISTRATION} serves any category (in a knowledge file: "

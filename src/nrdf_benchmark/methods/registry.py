@@ -48,6 +48,7 @@ METHODS = {
     "box-normals": Entry("box, snapped with oriented normals"),
     "box-mask": Entry("box, region as a mask"),
     "registration": Entry("smooth non-rigid registration with normals, region as a mask"),
+    "registration-model": Entry("the same as the model of any category, absent regions left out"),
     "ndf": Entry("NDF, nearest descriptor", "ndf", "ndf"),
     "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
     "imdc": Entry("IMDC, its inverse's points snapped", "imdc", "imdc"),
@@ -107,6 +108,11 @@ def _build(spec: MethodSpec) -> Method:
     if not entry.is_learned:
         if spec.name == "registration":
             return RegistrationMask()
+        if spec.name == "registration-model":
+            import nrdf
+            from nrdf_benchmark.methods.learned import FieldMethod
+
+            return FieldMethod(nrdf.load_model("registration"), "mask")
         if spec.name == "box-mask":
             return BoundingBoxMask()
         return SnappedCopy(box=spec.name.startswith("box"), normals=spec.name.endswith("normals"))
