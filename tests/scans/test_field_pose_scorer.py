@@ -11,7 +11,6 @@ from nrdf.io.cloud import PointCloud
 from nrdf.regions.model import Model
 from nrdf.scans.align import align_scan
 from nrdf.scans.field_pose_scorer import FieldPoseScorer, family_prototypes
-from nrdf.scans.kind_check import LARGEST_Z_SCORE
 from nrdf.scans.pose_scorer import sparse_subset
 
 CHAIR = 1_000_003
@@ -32,8 +31,10 @@ def test_a_member_costs_what_is_usual_and_has_usual_proportions():
     ours, surface = scorer("chair"), full("chair", CHAIR)
     target = ours.model.encode(PointCloud(surface.points, surface.normals))
     assert ours.cost_of(target) < ours.usual_cost + 0.2
-    assert ours.proportion_z_score(target.points) < LARGEST_Z_SCORE
-    assert ours.proportion_z_score(target.points * [1.0, 0.3, 1.0]) > LARGEST_Z_SCORE
+    assert ours.proportion_z_score(target.points) < scorer("chair").largest_z_score
+    assert (
+        ours.proportion_z_score(target.points * [1.0, 0.3, 1.0]) > scorer("chair").largest_z_score
+    )
 
 
 def test_a_sparse_subset_keeps_the_extremes():

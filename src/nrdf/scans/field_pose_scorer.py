@@ -37,7 +37,9 @@ _DEPTH = 0.02  # below and above the surface, where occupancy is evaluated, cano
 _ERROR, _INSIDE = 0.3, 0.1  # weights of the expected error's logarithm, and of occupancy
 _USUAL_POINTS = 1024
 _BATCH = 36
-_COST_MARGIN, _COST_MARGIN_TO_ONE = 0.5, 0.55  # the second where one object is all that is known
+# The second of each where one object is all that is known.
+_COST_MARGIN, _COST_MARGIN_TO_ONE = 0.5, 0.55
+_LARGEST_Z_SCORE, _LARGEST_Z_SCORE_TO_ONE = 1.65, 3.0
 
 
 class FieldPoseScorer(PoseScorer):
@@ -104,6 +106,11 @@ class FieldPoseScorer(PoseScorer):
     def cost_margin(self) -> float:
         """As of `PoseScorer`."""
         return _COST_MARGIN if self.prototypes > 1 else _COST_MARGIN_TO_ONE
+
+    @property
+    def largest_z_score(self) -> float:
+        """As of `PoseScorer`."""
+        return _LARGEST_Z_SCORE if self.prototypes > 1 else _LARGEST_Z_SCORE_TO_ONE
 
     @cached_property
     def usual_cost(self) -> float:

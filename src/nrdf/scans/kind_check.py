@@ -23,9 +23,6 @@ from nrdf.scans.pose_scorer import PoseScorer
 
 MINIMUM_PROBABILITY = 0.3
 """Probability that an object stands upright and faces forward, below which there is a warning."""
-LARGEST_Z_SCORE, LARGEST_Z_SCORE_TO_ONE = 1.65, 3.0
-"""Standard deviations of its proportions from the known objects', from which, without a network,
-there is a warning; the second where one object is all that is known."""
 _COUNTED = 2048  # points in which objects are counted
 FITS = "upright and facing forward"
 _SOMETHING_ELSE = "something else"
@@ -187,8 +184,7 @@ def check_by_scorer(scorer: PoseScorer, cost: float, points: np.ndarray) -> Kind
     cost: at which those explain the points (`PoseScorer.fine`).
     """
     category, z_score = scorer.name, scorer.proportion_z_score(points)
-    largest = LARGEST_Z_SCORE if scorer.prototypes > 1 else LARGEST_Z_SCORE_TO_ONE
-    if cost < scorer.usual_cost + scorer.cost_margin and z_score < largest:
+    if cost < scorer.usual_cost + scorer.cost_margin and z_score < scorer.largest_z_score:
         return KindCheck(category, "like what is known of its kind")
     warning = (
         f"the target does not look like a {category} standing upright and facing +X: what is known "

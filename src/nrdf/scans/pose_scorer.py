@@ -54,6 +54,11 @@ class PoseScorer(ABC):
     def cost_margin(self) -> float:
         """The cost above the usual one from which a cloud does not look like one of the kind."""
 
+    @property
+    @abstractmethod
+    def largest_z_score(self) -> float:
+        """The z-score of proportions from which a cloud does not look like one of the kind."""
+
     @abstractmethod
     def coarse(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Cost (h,) of h hypotheses, fast: clouds (h, n, 3) in hypothesised canonical frames."""

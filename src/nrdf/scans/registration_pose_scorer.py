@@ -40,6 +40,8 @@ class RegistrationPoseScorer(PoseScorer):
     usual_cost: ClassVar[float] = 1.1  # type: ignore[misc]
     cost_margin: ClassVar[float] = 0.9  # type: ignore[misc]
 
+    largest_z_score: ClassVar[float] = 4.0  # type: ignore[misc]
+
     def __init__(self, model: CloudEncoder, prototypes: Sequence[PointCloud]) -> None:
         """`prototypes` are canonical in orientation. Raises ModelError if there are none."""
         if not prototypes:

@@ -37,7 +37,7 @@ def test_methods_without_weights_need_nothing():
     names = [name for name, entry in METHODS.items() if not entry.is_learned]
     assert find_methods(names, "chair") == [MethodSpec(name) for name in names]
     copies = ["copy", "box", "copy-normals", "box-normals"]
-    assert names == [*copies, "box-mask", "registration"]
+    assert names == [*copies, "box-mask", "registration", "registration-model"]
 
 
 def test_the_default_field_comes_from_the_zoo_unless_a_model_is_given(tmp_path):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
+
+from nrdf.io.cloud import PointCloud
 from nrdf.studio.model import uploads
 from nrdf.studio.model.document import REFERENCE
 
@@ -29,3 +32,28 @@ def test_bundled_knowledge_is_opened_with_its_regions(page):
     page.does(tab._open)
     assert len(page.editor.document.regions) == 5 and page.editor.object_keys() == [REFERENCE]
     assert "8192 points" in tab.status.content
+
+
+def test_a_kind_without_a_model_is_served_by_registration(page, tmp_path):
+    from nrdf.io.cloud import write_cloud
+    from nrdf.studio.model.session_file import read_document, write_document
+    from nrdf.studio.panels.reference import OTHER_KIND
+
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (600, 3))
+    write_cloud(tmp_path / "helmet.ply", PointCloud(points, unit="m"))
+    file = SimpleNamespace(name="helmet.ply", content=(tmp_path / "helmet.ply").read_bytes())
+    tab = page.studio.panel.reference
+    tab.category.value = OTHER_KIND
+    tab._show_kind()
+    assert tab.kind.visible
+    assert "say what kind of object it is" in page.does(tab._load, file)
+    tab.kind.value = "chiar"
+    assert "did you mean 'chair'?" in page.does(tab._load, file)
+    tab.kind.value = "helmet"
+    page.does(tab._load, file)
+    document = page.editor.document
+    assert (document.category, document.model) == ("helmet", "registration")
+    assert "by registration" in tab.status.content
+    folder = page.editor.session.folder
+    write_document(folder, document)
+    assert read_document(folder).model == "registration"

@@ -19,6 +19,7 @@ from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.check import CheckedProcess, check_process
+from nrdf.process.model_choice import choose_model
 from nrdf.process.strategy import strategy_of
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
@@ -83,7 +84,7 @@ class CorrespondenceFeatures:
 class LocalComputing:
     """Computes in this process, for one document after the other, and keeps what the next can use.
 
-    load: gives the model of a category. `use_objects` comes before the methods that are about
+    load: gives a model by its name. `use_objects` comes before the methods that are about
     objects, which are named by their files.
     """
 
@@ -149,7 +150,8 @@ class LocalComputing:
         """
         progress(0, 1)
         if self._transfer_process is None or self._transfer_process[0] != revision:
-            model = self._model(document.category)
+            chosen = choose_model(document.category, document.model, allow_unusual=True)
+            model = self._model(chosen.name)
             bound_knowledge = bound_knowledge_of(clouds, document)
             self._transfer_process = revision, ProcessTransfer(bound_knowledge, model)
 
@@ -169,7 +171,7 @@ class LocalComputing:
         features = {}
         for done, (key, file) in enumerate(files.items()):
             progress(done, len(files))
-            kept = (self._prepared.model.category, reference, file)
+            kept = (_name(self._prepared.model), reference, file)
             if kept not in self._features:
                 cloud = encoded.encoded_cloud if file == reference else self._encode(file)
                 self._features[kept] = encoded.correspondence_features(cloud)
@@ -183,10 +185,10 @@ class LocalComputing:
         assert self._transfer_process is not None, "`prepare` comes first"
         return self._transfer_process[1]
 
-    def _model(self, category: str) -> Model:
-        if category not in self._models:
-            self._models[category] = self._load(category)
-        return self._models[category]
+    def _model(self, name: str) -> Model:
+        if name not in self._models:
+            self._models[name] = self._load(name)
+        return self._models[name]
 
     def _paintable(self, file: str) -> PaintableCloud:
         if file not in self._paintables:
@@ -195,9 +197,9 @@ class LocalComputing:
 
     def _encode(self, file: str) -> EncodedCloud:
         model = self._prepared.model
-        if (model.category, file) not in self._encoded:
-            self._encoded[model.category, file] = model.encode(self._clouds[file])
-        return self._encoded[model.category, file]
+        if (_name(model), file) not in self._encoded:
+            self._encoded[_name(model), file] = model.encode(self._clouds[file])
+        return self._encoded[_name(model), file]
 
 
 class ChildProcessComputing:
@@ -236,6 +238,10 @@ class ChildProcessComputing:
         if self._child is not None:
             self._child.end()
         self._child = None
+
+
+def _name(model: Model) -> str:
+    return str(model.metadata.get("name", model.category))
 
 
 def without_clouds(document: Document) -> Document:

@@ -51,13 +51,15 @@ class Target:
 
 @dataclass(frozen=True)
 class Document:
-    """Reference, regions with their processes, and targets."""
+    """Reference, regions with their processes, and targets; the model of a knowledge file, if it
+    is not the category's."""
 
     category: str = "chair"
     reference: LoadedObject | None = None
     regions: tuple[PaintedRegion, ...] = ()
     targets: tuple[Target, ...] = ()
     allow_overlap: bool = False
+    model: str | None = None
 
     def region(self, name: str) -> PaintedRegion | None:
         """The region of that name, or None."""

@@ -60,10 +60,13 @@ class Editor:
 
     # --- objects
 
-    def open_reference(self, name: str, cloud: PointCloud, category: str) -> None:
-        """Begin with a reference, in metres; earlier regions and targets are removed."""
+    def open_reference(
+        self, name: str, cloud: PointCloud, category: str, model: str | None = None
+    ) -> None:
+        """Begin with a reference, in metres; earlier regions and targets are removed. model: that
+        finds regions, instead of the category's."""
         loaded = self.session.store(shown_name(name), thinned_reference(cloud))
-        self.session.change(Document(category, loaded))
+        self.session.change(Document(category, loaded, model=model))
 
     def open_knowledge(self, name: str, bound_knowledge: BoundKnowledge) -> None:
         """Begin with the content of a knowledge file, on its reference."""
@@ -80,12 +83,14 @@ class Editor:
         knowledge = bound_knowledge.knowledge
         regions = painted_regions_of(bound_knowledge, colours)
         self.session.change(
-            Document(knowledge.category, loaded, regions, (), knowledge.allow_overlap)
+            Document(
+                knowledge.category, loaded, regions, (), knowledge.allow_overlap, knowledge.model
+            )
         )
 
     def new_session(self) -> None:
         """Remove everything; undo brings it back."""
-        self.session.change(Document(self.document.category))
+        self.session.change(Document(self.document.category, model=self.document.model))
 
     def add_target(self, name: str, cloud: PointCloud) -> str:
         """Add a target, in metres; its name."""

@@ -193,7 +193,8 @@ def _same_processes(one: Document, other: Document) -> bool:
 
     def content(document: Document) -> tuple[object, ...]:
         regions = tuple((r.name, id(r.mask), id(r.steps)) for r in document.regions)
-        return (document.category, document.allow_overlap, id(document.reference), regions)
+        kind = (document.category, document.model)
+        return (kind, document.allow_overlap, id(document.reference), regions)
 
     return content(one) == content(other)
 

@@ -118,6 +118,7 @@ class _Target(_Object):
 class _Content(StrictModel):
     version: int = Field(ge=1)
     category: str = Field(min_length=1, max_length=100)
+    model: str | None = Field(default=None, min_length=1, max_length=100)
     allow_overlap: bool
     reference: _Object | None
     regions: list[_Region]
@@ -161,7 +162,7 @@ def read_document(folder: Path) -> Document:
     if content.version > VERSION:
         raise _newer(path)
     if content.reference is None:
-        return Document(content.category)
+        return Document(content.category, model=content.model)
     try:
         reference = _read_object(folder, content.reference)
         regions = tuple(
@@ -171,7 +172,9 @@ def read_document(folder: Path) -> Document:
         targets = tuple(_read_target(folder, target) for target in content.targets)
     except NrdfError as error:
         raise ProcessError(f"{path} is damaged: {error}") from None
-    return Document(content.category, reference, regions, targets, content.allow_overlap)
+    return Document(
+        content.category, reference, regions, targets, content.allow_overlap, content.model
+    )
 
 
 def put_aside(folder: Path) -> Path:
@@ -247,6 +250,7 @@ def _plain(document: Document) -> dict[str, Any]:
     return {
         "version": VERSION,
         "category": document.category,
+        "model": document.model,
         "allow_overlap": document.allow_overlap,
         "reference": None if document.reference is None else loaded(document.reference),
         "regions": [

@@ -85,7 +85,11 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
     path = clouds / document.reference.file
     reference = {"cloud": document.reference.file, "sha256": checksum(path)}
     return validated(
-        {"allow_overlap": document.allow_overlap, **_content(document.category, reference, drawn)},
+        {
+            "model": document.model,
+            "allow_overlap": document.allow_overlap,
+            **_content(document.category, reference, drawn),
+        },
         ORIGIN,
     )
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from nrdf.bundled import KNOWLEDGE, REFERENCE
+from nrdf.errors import ProcessError
+from nrdf.field.registration import REGISTRATION
 from nrdf.geometry.units import METRES
 from nrdf.process.bound_knowledge import read_bound_knowledge
+from nrdf.process.model_choice import choose_model
 from nrdf.studio.context import StudioContext
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs, PanelEvent
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
 
 AS_IN_FILE = "as in the file"
+OTHER_KIND = "another kind …"
+OF_THE_CATEGORY = "the category's own"
 WITH_KNOWLEDGE = "chair with its five processes"
 
 
@@ -31,13 +36,16 @@ class ReferenceTab:
         self.bundled = gui.add_dropdown("Bundled chair", (*BUNDLED, WITH_KNOWLEDGE))
         self.open = gui.add_button("Open the bundled chair", icon=None)
         gui.add_markdown("Or a scan or mesh of your own:")
-        self.category = gui.add_dropdown("Category", known, initial_value=first)
+        self.category = gui.add_dropdown("Category", (*known, OTHER_KIND), initial_value=first)
+        self.kind = gui.add_text("Its kind", "", visible=False)
+        self.model = gui.add_dropdown("Model", (OF_THE_CATEGORY, REGISTRATION))
         self.unit = gui.add_dropdown("Unit", (AS_IN_FILE, *METRES))
         self.upload = gui.add_upload_button(
             "Load a file …", mime_type=",".join(ENDINGS), hint=f"{', '.join(ENDINGS)}"
         )
         self.status = gui.add_markdown("")
         self.new = gui.add_button("New session", color="gray")
+        inputs.on(self.category.on_update, lambda _: self._show_kind())
         inputs.on(self.open.on_click, lambda _: self._open())
         inputs.on(self.upload.on_upload, lambda event: self._load(event.value))
         inputs.on(self.new.on_click, self._ask)
@@ -53,7 +61,9 @@ class ReferenceTab:
         sides = " × ".join(f"{1e3 * side:.0f}" for side in size)
         self.status.content = (
             f"**{reference.name}**, category {document.category}: {len(reference.cloud)} points, "
-            f"{sides} mm. Every change is saved at once."
+            f"{sides} mm. "
+            + ("Regions are found by registration. " if document.model == REGISTRATION else "")
+            + "Every change is saved at once."
         )
 
     def _open(self) -> None:
@@ -65,13 +75,28 @@ class ReferenceTab:
         self.context.restore()
 
     def _load(self, file: Any) -> None:
-        category = self.category.value
+        category = self._category()
+        given = None if self.model.value == OF_THE_CATEGORY else self.model.value
+        chosen = choose_model(category, given).name  # asks back where the kind looks misspelt
+        model = None if chosen == category else chosen
 
         def opened(cloud: PointCloud) -> None:
-            self.context.editor.open_reference(file.name, cloud, category)
+            self.context.editor.open_reference(file.name, cloud, category, model)
             self.context.restore()
 
         self.context.read(file, category, unit_of(self.unit.value), opened)
+
+    def _show_kind(self) -> None:
+        self.kind.visible = self.category.value == OTHER_KIND
+
+    def _category(self) -> str:
+        """The category that was chosen, or the kind that was typed."""
+        if self.category.value != OTHER_KIND:
+            return str(self.category.value)
+        kind = " ".join(self.kind.value.split())
+        if not kind:
+            raise ProcessError("say what kind of object it is, in the field 'Its kind'")
+        return kind
 
     def _ask(self, event: PanelEvent) -> None:
         gui = self.context.server.gui
