@@ -43,6 +43,7 @@ def info(as_json: bool = False) -> None:
         console.print(f"{model['name']}: {scores or 'no scores'}")
         for source, licences in model["licences"].items():
             console.print(f"  {source}: {licences}", style="dim")
+    console.print("registration: trained on nothing, for any category (--model registration)")
 
 
 def gather() -> dict[str, Any]:
