@@ -207,7 +207,10 @@ class TargetMesh:
             # One patch for each cell and side that the normals look to.
             cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
             side = (normals @ _SIDES.T).argmax(axis=1)
-            _, number = np.unique(np.column_stack([cell, side]), axis=0, return_inverse=True)
+            # One number for each is sorted much faster than rows of four.
+            count = cell.max(axis=0) + 1
+            key_of = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES)
+            _, number = np.unique(key_of + side, return_inverse=True)
             number = number.reshape(-1)
             total = np.bincount(number, areas)
             centre = [np.bincount(number, areas * middles[:, a]) / total for a in range(3)]

@@ -27,7 +27,7 @@ from nrdf.toolpath.modifiers import (
     start_at,
 )
 from nrdf.toolpath.modifiers.join import Project
-from nrdf.toolpath.modifiers.order import Lift
+from nrdf.toolpath.modifiers.order import Lift, way_between
 from nrdf.toolpath.modifiers.run_off import Free
 from nrdf.toolpath.planners import PLANNERS, Planner
 from nrdf.toolpath.region_samples import sample_evenly
@@ -87,7 +87,7 @@ def modified(
         paths, strategy.least_line_m, points, outward, radius, needed=_NEEDED, lost=_LOST
     )
     paths = chord_error(paths, project, strategy.chord_error_m)
-    paths = in_order(paths, region, strategy)
+    paths = _rows_in_order(paths, region, strategy, project)
     free = _free(region.parent, radius)
     paths = run_off(paths, strategy.run_off_m, spacing, strategy.run_off_height_m, free)
     if strategy.joined_gap_m > 0.0:
@@ -98,6 +98,24 @@ def modified(
         paths = order_shortest(steady, strategy.line_order == "one-way", _lift(strategy))
     dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
     return offset(dragged, strategy.offset_m)
+
+
+def _rows_in_order(
+    paths: Sequence[SurfacePath], region: RegionMesh, strategy: Strategy, project: Project
+) -> list[SurfacePath]:
+    """Paths in order: as they are, or joined row by row first where fewer lifts come of it.
+
+    Lines that run off the part, or all one way, are joined later, or not.
+    """
+    ordered = in_order(paths, region, strategy)
+    gap, spacing = strategy.joined_gap_m, strategy.spacing_m
+    if gap <= 0.0 or strategy.run_off_m > 0.0 or strategy.line_order == "one-way":
+        return ordered
+    tries = [join(ordered, project, spacing, gap)]
+    rows = join(paths, project, spacing, gap)
+    if len(rows) < len(paths):
+        tries.append(join(in_order(rows, region, strategy), project, spacing, gap))
+    return min(tries, key=lambda made: (len(made), way_between(made, _lift(strategy))))
 
 
 def in_order(

@@ -66,3 +66,23 @@ def test_points_between_lie_on_the_surface():
     (made,) = join(given, cylinder, 0.005, GAP)
     assert np.linalg.norm(made.contacts[:, 1:], axis=1) == pytest.approx(radius)
     assert turns(made.normals).max() < 0.06
+
+
+def test_all_ways_are_projected_at_once():
+    calls = []
+
+    def counted(places, normals):
+        calls.append(len(places))
+        return plane(places, normals)
+
+    assert len(join(rows(np.arange(30) * 0.025), counted, SPACING, GAP)) == 1
+    assert calls == [29 * 2]
+
+
+def test_a_way_along_an_edge_keeps_to_its_side():
+    def edge(places, normals):
+        flat, _outward, there = plane(places, normals)
+        return flat, np.tile([1.0, 0.0, 0.0], (len(places), 1)), there
+
+    (made,) = join(rows([0.0, 0.025]), edge, SPACING, GAP)
+    assert turns(made.normals).max() < 1e-6

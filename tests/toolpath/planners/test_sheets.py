@@ -65,3 +65,24 @@ def test_ends_and_width_of_a_plate():
     away = part.mesh.vertices[ends.first, 0].mean() - part.mesh.vertices[ends.last, 0].mean()
     assert abs(away) > 0.37
     assert width(part.mesh) == pytest.approx(0.036, rel=0.02)
+
+
+def test_a_short_wide_cone_is_worked_around_and_a_long_one_along():
+    def kinds(length):
+        around = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        rings = [
+            np.column_stack([r * np.cos(around), r * np.sin(around), np.full(48, z)])
+            for r, z in ((0.06, 0.0), (0.035, length))
+        ]
+        k = np.arange(48)
+        faces = np.concatenate(
+            [
+                np.column_stack([k, (k + 1) % 48, 48 + k]),
+                np.column_stack([(k + 1) % 48, 48 + (k + 1) % 48, 48 + k]),
+            ]
+        )
+        whole = TargetMesh(np.concatenate(rings), faces, ())
+        (sheet,) = cut(RegionMesh.from_faces(whole, np.ones(len(faces), bool)))
+        return is_band(sheet, STRATEGY), is_round_rod(sheet)
+
+    assert kinds(0.2)[0] and kinds(1.0) == (False, True)

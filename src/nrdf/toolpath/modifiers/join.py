@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,46 +32,63 @@ def join(
     above `largest_turn_rad`, stays a gap; so does one whose way leaves the region, or jumps on it.
     Turned to drive on from the nearer end, each path after the first may be driven backwards.
     """
-    joined: list[SurfacePath] = []
-    for path in paths:
-        if not joined:
-            joined.append(path)
-            continue
-        last = joined[-1]
-        place = last.contacts[-1]
+    if not paths:
+        return []
+    turned = [paths[0]]
+    for path in paths[1:]:
+        place = turned[-1].contacts[-1]
         near, far = (np.linalg.norm(path.contacts[k] - place) for k in (0, -1))
-        path = path if near <= far else path.reversed()
-        way = _way(last, path, project, spacing_m, largest_gap_m, largest_turn_rad)
+        turned.append(path if near <= far else path.reversed())
+    ways = _ways(turned, project, spacing_m, largest_gap_m, largest_turn_rad)
+    joined: list[list[SurfacePath]] = [[turned[0]]]
+    for way, path in zip(ways, turned[1:], strict=True):
         if way is None:
-            joined.append(path)
-            continue
-        joined[-1] = SurfacePath(
-            np.concatenate([last.contacts, way.contacts, path.contacts]),
-            np.concatenate([last.normals, way.normals, path.normals]),
+            joined.append([path])
+        else:
+            joined[-1] += [way, path]
+    return [
+        run[0]
+        if len(run) == 1
+        else SurfacePath(
+            np.concatenate([path.contacts for path in run]),
+            np.concatenate([path.normals for path in run]),
         )
-    return joined
+        for run in joined
+    ]
 
 
-def _way(
-    last: SurfacePath,
-    path: SurfacePath,
+def _ways(
+    paths: Sequence[SurfacePath],
     project: Project,
     spacing_m: float,
     largest_gap_m: float,
     largest_turn_rad: float,
-) -> SurfacePath | None:
-    """The points between two paths, maybe none of them; None where they stay apart."""
-    start, stop = last.contacts[-1], path.contacts[0]
-    gap = float(np.linalg.norm(stop - start))
-    if gap > largest_gap_m:
-        return None
-    if angles_between(last.normals[-1:], path.normals[:1])[0] > largest_turn_rad:
-        return None
-    count = int(np.ceil(gap / spacing_m - 1e-9)) + 1
-    share = np.linspace(0.0, 1.0, max(count, 2))[1:-1, None]
-    normals = unit_vectors((1.0 - share) * last.normals[-1] + share * path.normals[0])
-    places, outward, there = project((1.0 - share) * start + share * stop, normals)
-    whole = np.concatenate([[start], places, [stop]])
-    if not there.all() or step_lengths(whole).max() > _STRETCH * spacing_m:
-        return None
-    return SurfacePath(places, outward)
+) -> list[SurfacePath | None]:
+    """The points between each path and the next, maybe none of them; None where they stay apart."""
+    ways: list[SurfacePath | None] = [None] * (len(paths) - 1)
+    straight: list[tuple[int, np.ndarray, np.ndarray]] = []
+    for number, (last, path) in enumerate(pairwise(paths)):
+        start, stop = last.contacts[-1], path.contacts[0]
+        gap = float(np.linalg.norm(stop - start))
+        if gap > largest_gap_m:
+            continue
+        if angles_between(last.normals[-1:], path.normals[:1])[0] > largest_turn_rad:
+            continue
+        count = int(np.ceil(gap / spacing_m - 1e-9)) + 1
+        share = np.linspace(0.0, 1.0, max(count, 2))[1:-1, None]
+        normals = unit_vectors((1.0 - share) * last.normals[-1] + share * path.normals[0])
+        straight.append((number, (1.0 - share) * start + share * stop, normals))
+    if not straight:
+        return ways
+    # All at once: a projection costs little more for many points than for one.
+    cuts = np.cumsum([len(points) for _, points, _ in straight])[:-1]
+    asked = [np.concatenate(kind) for kind in list(zip(*straight, strict=True))[1:]]
+    found = zip(*(np.split(kind, cuts) for kind in project(*asked)), strict=True)
+    for (number, _, normals), (places, outward, there) in zip(straight, found, strict=True):
+        ends = paths[number].contacts[-1:], paths[number + 1].contacts[:1]
+        steps = step_lengths(np.concatenate([ends[0], places, ends[1]]))
+        if there.all() and steps.max() <= _STRETCH * spacing_m:
+            # On an edge of the part the side beyond it is as near: the tool stays on this one.
+            aside = angles_between(outward, normals) > largest_turn_rad
+            ways[number] = SurfacePath(places, np.where(aside[:, None], normals, outward))
+    return ways

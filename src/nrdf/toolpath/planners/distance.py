@@ -58,10 +58,10 @@ def distance_across(mesh: FineMesh, side: np.ndarray) -> np.ndarray:
     return geodesic if even_share(mesh, geodesic) > share + _MORE_EVEN else straight
 
 
-def even_share(mesh: FineMesh, values: np.ndarray) -> float:
-    """Share of the area on which lines of a function (v,) are 0.85 to 1.15 of its steps apart."""
+def even_share(mesh: FineMesh, values: np.ndarray, uneven: float = 0.15) -> float:
+    """Share of the area on which lines of a function (v,) are 1 ± `uneven` of its steps apart."""
     slope = np.linalg.norm(mesh.slopes(values), axis=1)
-    even = (slope > 1.0 / 1.15) & (slope < 1.0 / 0.85)
+    even = (slope > 1.0 / (1.0 + uneven)) & (slope < 1.0 / (1.0 - uneven))
     return float(mesh.areas[even].sum() / mesh.areas.sum())
 
 

@@ -36,11 +36,13 @@ class Part:
     """A part of a region that hangs together, in fine triangles; or a sheet of one.
 
     whole: the part that a sheet was cut from, and at: (v,) which of its vertices the sheet's are.
+    slits: it is several flat pieces of one plane, and lines run over the slits between them.
     """
 
     mesh: FineMesh
     whole: Part | None = None
     at: np.ndarray | None = None
+    slits: bool = False
 
     def sheet(self, kept: np.ndarray) -> Part:
         """The triangles that are kept (f,) bool."""
@@ -129,23 +131,46 @@ def driven(
 
     Pieces shorter than the tool's radius are left out where longer lines are.
     """
-    length = np.array([total_length(line.points) for line in lines])
+    placed = [resampled(line, strategy.spacing_m) for line in lines]
+    runs = _over_slits(lines, placed, strategy) if part.slits else [[k] for k in range(len(lines))]
+    length = np.array([sum(total_length(lines[k].points) for k in run) for run in runs])
     least = min(strategy.tool_radius_m, float(length.max(initial=0.0)))
-    kept = [line for line, way in zip(lines, length, strict=True) if way >= least > 0.0]
+    kept = [run for run, way in zip(runs, length, strict=True) if way >= least > 0.0]
     if not kept:
         return []
-    placed = [resampled(line, strategy.spacing_m) for line in kept]
-    contacts = np.concatenate([points for points, _ in placed])
-    faces = part.mesh.origin[np.concatenate([face for _, face in placed])]
-    normals = region.mesh.smooth_normals(contacts, faces, strategy.tool_radius_m)
-    cuts = np.cumsum([len(points) for points, _ in placed])[:-1]
+    contacts = [np.concatenate([placed[k][0] for k in run]) for run in kept]
+    faces = np.concatenate([placed[k][1] for run in kept for k in run])
+    normals = region.mesh.smooth_normals(
+        np.concatenate(contacts), part.mesh.origin[faces], strategy.tool_radius_m
+    )
+    cuts = np.cumsum([len(points) for points in contacts])[:-1]
     paths = [
-        SurfacePath(points, outward, line.closed)
-        for line, points, outward in zip(
-            kept, np.split(contacts, cuts), np.split(normals, cuts), strict=True
-        )
+        SurfacePath(points, outward, lines[run[0]].closed)
+        for run, points, outward in zip(kept, contacts, np.split(normals, cuts), strict=True)
     ]
-    return snake_order(paths, [line.level for line in kept], strategy.stepover_m)
+    return snake_order(paths, [lines[run[0]].level for run in kept], strategy.stepover_m)
+
+
+def _over_slits(
+    lines: Sequence[MeshLine], placed: list[tuple[np.ndarray, np.ndarray]], strategy: Strategy
+) -> list[list[int]]:
+    """Runs of lines of one level, one beyond the other, with slits between that the tool is driven
+    over. Turns what was placed on them (n, 3), (n,) to run the same way."""
+    ends = np.array([points[-1] - points[0] for points, _ in placed]).reshape(-1, 3)
+    along = ends[int(np.argmax(np.linalg.norm(ends, axis=1)))] if len(ends) else np.zeros(3)
+    for k, (points, faces) in enumerate(placed):
+        if ends[k] @ along < 0.0:
+            placed[k] = points[::-1], faces[::-1]
+    runs: list[list[int]] = []
+    order = sorted(range(len(lines)), key=lambda k: (lines[k].level, placed[k][0][0] @ along))
+    for k in order:
+        if runs and lines[runs[-1][-1]].level == lines[k].level:
+            gap = placed[k][0][0] - placed[runs[-1][-1]][0][-1]
+            if np.linalg.norm(gap) < min(0.5 * strategy.tool_radius_m, 1.5 * strategy.spacing_m):
+                runs[-1].append(k)
+                continue
+        runs.append([k])
+    return runs
 
 
 def _needed(lines: list[MeshLine], strategy: Strategy) -> list[MeshLine]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
+from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.rod import rod_strokes
 from nrdf.toolpath.planners.sheet_lines import line_direction, sheet_lines
@@ -54,12 +55,12 @@ def _sheet_paths(
     region: RegionMesh, sheet: Part, strategy: Strategy, beside: Sequence[SurfacePath]
 ) -> list[SurfacePath]:
     """Paths on one sheet: what its lines leave, as the arms of a frame, is worked after it."""
-    if not is_band(sheet, strategy) and is_round_rod(sheet):
+    if not sheet.slits and not is_band(sheet, strategy) and is_round_rod(sheet):
         strokes = rod_strokes(region, sheet, strategy)
         if strokes:
             return strokes
     paths = driven(region, sheet, sheet_lines(region, sheet, strategy, beside), strategy)
-    if not paths or width(sheet.mesh) > _FRAME * strategy.stepover_m:
+    if not paths or sheet.slits or width(sheet.mesh) > _FRAME * strategy.stepover_m:
         return paths
     radius = strategy.tool_radius_m
     left = ~reached_from_paths(sheet, [*beside, *paths], radius)
@@ -77,7 +78,11 @@ def _sheet_paths(
 def _sheets(region: RegionMesh, strategy: Strategy) -> list[Part]:
     """All sheets of a region, those of its largest part first, large ones before small ones."""
     parts = parts_of(region, strategy)
-    return [sheet for part in parts for sheet in sheets_of(region, part, strategy)]
+    sheets = [sheet for part in parts for sheet in sheets_of(region, part, strategy)]
+    sheets = with_room(region, sheets, strategy.tool_radius_m)
+    if strategy.edge_margin_m > 0.0:
+        return sheets
+    return joined_in_planes(sheets, strategy.tool_radius_m)
 
 
 def is_needed(

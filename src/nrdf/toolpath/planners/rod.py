@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -21,19 +22,22 @@ from nrdf.geometry.polylines import step_lengths, total_length
 from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, driven, refined
+from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
 from nrdf.toolpath.planners.ordering import snake_order
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.reeb_graph import touching_faces
-from nrdf.toolpath.planners.rod_sections import RodFrame, Section, sections, straightened, untorn
+from nrdf.toolpath.planners.rod_sections import RodFrame, Section, at_shares, lengths_at, nearest_on_section, sections, straightened, untorn
 from nrdf.toolpath.planners.rod_skeleton import split_at_branches
 from nrdf.toolpath.planners.sheet_lines import sheet_lines
 from nrdf.toolpath.planners.sheets import sheets_of
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
-_SLENDER, _SLENDER_STRIP, _WHOLE = 1.0, 3.0, 0.7
+_SLENDER, _SLENDER_STRIP, _WHOLE = 1.5, 3.0, 0.7
 """A rod is that many times as long as its section is around, or as a strip is wide, and its
 sections account for that share of its surface."""
+_EVEN = 1.8  # times as long as a short section is a long one, at most: else it is a cone or a panel
+_NO_ROD = 0.4  # of a part's area that is in no rod: then none of it is worked as one
 _LEAST = 8.0  # triangles' edges, squared: a rod has more surface
 _OPEN = 0.4  # of a section: where more is missing, it is a strip with two edges
 _STRAIGHT = 2.0  # thicknesses: sections that differ over less don't lead strokes aside
@@ -59,7 +63,7 @@ class Rod:
     sections: list[Section | None]
     around_m: float
 
-    @property
+    @cached_property
     def closed(self) -> bool:
         """Whether it closes around itself, but for gaps; else it is a strip."""
         gaps = [s.gap_m / s.length_m for s in self.sections if s is not None]
@@ -87,8 +91,9 @@ def rods_of(part: Part, spacing_m: float = 0.01) -> tuple[list[Rod], list[Part]]
             rest |= number == k
         else:
             rods.append(rod)
-    left = [] if not rest.any() else [Part(m) for m in part.mesh.part(rest).components()]
-    return rods, left
+    if float(part.mesh.areas[rest].sum()) > _NO_ROD * float(part.mesh.areas.sum()):
+        rods, rest = [], np.ones(len(rest), bool)
+    return rods, _pieces(part, rest)
 
 
 def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
@@ -102,7 +107,7 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
         strokes = [path for rod in rods for path in _strokes(region, part, rod, strategy)]
         if strokes:
             left = ~reached_from_paths(part, strokes, strategy.tool_radius_m)
-            rest = [Part(m) for m in part.mesh.part(left).components()] if left.any() else []
+            rest = _pieces(part, left)
         found += strokes
         for piece in rest:
             if not strokes or _is_wide(piece, strategy.tool_radius_m):
@@ -124,7 +129,11 @@ def rod_strokes(region: RegionMesh, part: Part, strategy: Strategy) -> list[Surf
 def _raster(region: RegionMesh, part: Part, strategy: Strategy) -> list[SurfacePath]:
     """Lines of the sides of what is no rod, without short ones where there are longer ones."""
     found: list[SurfacePath] = []
-    for sheet in sheets_of(region, part, strategy):
+    radius = strategy.tool_radius_m
+    sheets = with_room(region, sheets_of(region, part, strategy), radius)
+    if strategy.edge_margin_m == 0.0:
+        sheets = joined_in_planes(sheets, radius)
+    for sheet in sheets:
         if not found or _is_wide(sheet, strategy.tool_radius_m):
             found += driven(region, sheet, sheet_lines(region, sheet, strategy, found), strategy)
     long = [path for path in found if total_length(path.contacts) >= strategy.tool_radius_m]
@@ -136,7 +145,7 @@ def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> li
     there = [k for k, section in enumerate(rod.sections) if section is not None]
     usual = [s for s in rod.sections if s is not None]
     shares, sides = _stroke_shares(rod, usual, strategy)
-    wanted = np.stack([_at_shares(section, shares, rod.closed) for section in usual])
+    wanted = np.stack([at_shares(section, shares, rod.closed) for section in usual])
     thick = rod.around_m / np.pi / strategy.spacing_m  # stations
     around = np.array([[[s.length_m - s.gap_m]] for s in usual])
     size = _smooth(around, thick)
@@ -146,7 +155,7 @@ def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> li
     faces = np.zeros((len(usual), len(shares)), int)
     good = np.zeros((len(usual), len(shares)), bool)
     for s, section in enumerate(usual):
-        places[s], faces[s], away = _on_section(section, wanted[s])
+        places[s], faces[s], away = nearest_on_section(section, wanted[s])
         good[s] = away < _AWAY * strategy.stepover_m
     if strategy.edge_margin_m > 0.0 and len(part.mesh.border):
         nearest = cKDTree(part.mesh.vertices[part.mesh.border])
@@ -156,7 +165,7 @@ def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> li
     paths, numbers = [], []
     for k in range(len(shares)):
         on = np.flatnonzero(good[:, k])
-        far = step_lengths(places[on, k]) > _STEP * strategy.spacing_m
+        far = steplengths_at(places[on, k]) > _STEP * strategy.spacing_m
         far |= np.diff(np.array(there)[on]) > 2
         for run in np.split(on, np.flatnonzero(far) + 1):
             if len(run) > 1 and total_length(places[run, k]) >= strategy.tool_radius_m:
@@ -185,6 +194,9 @@ def _rod(mesh: FineMesh, points: np.ndarray, thickness_m: float, spacing_m: floa
     around = np.array([0.0 if s is None else s.length_m - s.gap_m for s in found])
     usual = float(np.median(around))
     if usual <= 0.0 or length < _SLENDER * usual:
+        return None
+    short, long = np.quantile(around, [0.2, 0.8])
+    if long > _EVEN * short:
         return None
     if around.sum() * length / count < _WHOLE * float(mesh.areas.sum()):
         return None
@@ -224,7 +236,7 @@ def _corners(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
     shares = (np.arange(_SHARES) + 0.5) / _SHARES
     mean = np.zeros((_SHARES, 2))
     for section in usual:
-        at = _lengths(section, shares, rod.closed)
+        at = lengths_at(section, shares, rod.closed)
         step = np.searchsorted(section.along, at % section.length_m, side="right") - 1
         step = np.clip(step, 0, len(section.faces) - 1)
         ahead = np.diff(section.flat, axis=0)[step]
@@ -258,36 +270,6 @@ def _corners(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
     return np.sort(np.array(found))
 
 
-def _lengths(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
-    """Arc lengths (k,) of shares of a section. A closed one starts where it passes the frame's
-    right, farthest out; an open one after its widest gap."""
-    if closed:
-        x, y = section.flat[:, 0], section.flat[:, 1]
-        up = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
-        start = 0.0
-        if len(up):
-            way = -y[up] / np.maximum(y[up + 1] - y[up], 1e-300)
-            out = x[up] + way * (x[up + 1] - x[up])
-            k = int(np.argmax(out))
-            start = float(
-                section.along[up[k]] + way[k] * (section.along[up[k] + 1] - section.along[up[k]])
-            )
-        return start + shares * section.length_m
-    step = np.diff(section.along)
-    gap = int(np.argmax(np.where(section.faces < 0, step, -1.0)))
-    start = float(section.along[gap + 1])
-    return start + shares * (section.length_m - float(step[gap]))
-
-
-def _at_shares(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
-    """Places (k, 2) in the frame at shares of a section; NaN in its gaps."""
-    at = _lengths(section, shares, closed) % section.length_m
-    step = np.clip(np.searchsorted(section.along, at, side="right") - 1, 0, len(section.faces) - 1)
-    flat = np.stack([np.interp(at, section.along, section.flat[:, a]) for a in (0, 1)], axis=1)
-    flat[section.faces[step] < 0] = np.nan
-    return flat
-
-
 def _smooth(wanted: np.ndarray, thick: float) -> np.ndarray:
     """Values (s, k, a) without kinks over `thick` stations; gaps (NaN) are filled along the rod."""
     count = len(wanted)
@@ -307,22 +289,6 @@ def _smooth(wanted: np.ndarray, thick: float) -> np.ndarray:
     )
 
 
-def _on_section(section: Section, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The nearest places (k, 3) of a section to places (k, 2) in the frame, their triangles (k,),
-    and how far they are, m."""
-    on = np.flatnonzero(section.faces >= 0)
-    start, ahead = section.flat[on], section.flat[on + 1] - section.flat[on]
-    square = np.maximum((ahead**2).sum(axis=1), 1e-300)
-    share = np.einsum("kna,na->kn", wanted[:, None] - start[None], ahead) / square
-    share = np.clip(share, 0.0, 1.0)
-    away = np.linalg.norm(wanted[:, None] - (start + share[..., None] * ahead), axis=2)
-    best = away.argmin(axis=1)
-    row = np.arange(len(wanted))
-    one, other = section.points[on[best]], section.points[on[best] + 1]
-    places = one + share[row, best, None] * (other - one)
-    return places, section.faces[on[best]], away[row, best]
-
-
 def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
     """The parts of a region, largest first; what touches along a seam is one part."""
     fine = refined(region, strategy)
@@ -340,8 +306,16 @@ def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
     return [Part(fine.part(number == k)) for k in chosen]
 
 
+def _pieces(part: Part, chosen: np.ndarray) -> list[Part]:
+    """What hangs together of a part's chosen (f,) triangles, without what has no area."""
+    if not float(part.mesh.areas[chosen].sum()) > 0.0:
+        return []
+    return [Part(mesh) for mesh in part.mesh.part(chosen).components()]
+
+
 def _is_wide(part: Part, radius_m: float) -> bool:
     """Whether a part that was left is worth a line of its own."""
     area = float(part.mesh.areas.sum())
-    extent = float(np.ptp(part.mesh.vertices @ part.axes[0]))
-    return area >= SPECK * np.pi * radius_m**2 and area >= _WIDE * radius_m * extent
+    if area < SPECK * np.pi * radius_m**2:
+        return False
+    return area >= _WIDE * radius_m * float(np.ptp(part.mesh.vertices @ part.axes[0]))

@@ -202,3 +202,49 @@ def _section(
     faces[seam] = np.roll(faces, 1)[seam]
     points, flat = np.concatenate([points, points[:1]]), np.concatenate([flat, flat[:1]])
     return Section(points, flat, faces, arc_length(points))
+
+
+def lengths_at(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
+    """Arc lengths (k,) of shares of a section. A closed one starts where it passes the frame's
+    right, farthest out; an open one after its widest gap."""
+    if closed:
+        x, y = section.flat[:, 0], section.flat[:, 1]
+        up = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+        start = 0.0
+        if len(up):
+            way = -y[up] / np.maximum(y[up + 1] - y[up], 1e-300)
+            out = x[up] + way * (x[up + 1] - x[up])
+            k = int(np.argmax(out))
+            start = float(
+                section.along[up[k]] + way[k] * (section.along[up[k] + 1] - section.along[up[k]])
+            )
+        return start + shares * section.length_m
+    step = np.diff(section.along)
+    gap = int(np.argmax(np.where(section.faces < 0, step, -1.0)))
+    start = float(section.along[gap + 1])
+    return start + shares * (section.length_m - float(step[gap]))
+
+
+def at_shares(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
+    """Places (k, 2) in the frame at shares of a section; NaN in its gaps."""
+    at = lengths_at(section, shares, closed) % section.length_m
+    step = np.clip(np.searchsorted(section.along, at, side="right") - 1, 0, len(section.faces) - 1)
+    flat = np.stack([np.interp(at, section.along, section.flat[:, a]) for a in (0, 1)], axis=1)
+    flat[section.faces[step] < 0] = np.nan
+    return flat
+
+
+def nearest_on_section(section: Section, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The nearest places (k, 3) of a section to places (k, 2) in the frame, their triangles (k,),
+    and how far they are, m."""
+    on = np.flatnonzero(section.faces >= 0)
+    start, ahead = section.flat[on], section.flat[on + 1] - section.flat[on]
+    square = np.maximum((ahead**2).sum(axis=1), 1e-300)
+    share = np.einsum("kna,na->kn", wanted[:, None] - start[None], ahead) / square
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(wanted[:, None] - (start + share[..., None] * ahead), axis=2)
+    best = away.argmin(axis=1)
+    row = np.arange(len(wanted))
+    one, other = section.points[on[best]], section.points[on[best] + 1]
+    places = one + share[row, best, None] * (other - one)
+    return places, section.faces[on[best]], away[row, best]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.polylines import total_length
+from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import (
     distance_across,
@@ -20,6 +21,7 @@ from nrdf.toolpath.planners.distance import (
     signed_distance,
 )
 from nrdf.toolpath.planners.field_lines import SPIKE, Part, lines_at
+from nrdf.toolpath.planners.flat_sheets import main_direction
 from nrdf.toolpath.planners.level_lines import MeshLine
 from nrdf.toolpath.planners.reach import reached_from_lines, reached_from_paths
 from nrdf.toolpath.planners.sheets import Ends, band_borders, ends_of, is_band, width
@@ -39,6 +41,7 @@ _SPREAD, _ENDS = 1.6, 0.3  # of a strip's width and of its length: how far its e
 _WIDE, _MORE = 6.0, 2  # stepovers: only narrower sheets get that many more lines
 _REACHED, _GAIN = 0.985, 0.01  # shares of a sheet's area
 _SIDEWAYS = 0.6  # cosine
+_STEEP, _ALL = 0.005, 0.995  # what a height's slope lacks of 1 on a plane, and where it may not
 
 
 def sheet_lines(
@@ -51,6 +54,10 @@ def sheet_lines(
     so far that the tool does not reach its sides has more, unless paths beside it reach those.
     Raises ProcessError for a direction that stands on the sheet.
     """
+    if part.slits:
+        along = line_direction(part, strategy.direction)
+        height = height_over_middle(part, across_directions(part, along)[0])
+        return lines_at(part, height, strategy)
     values, lines = _best_field(part, strategy)
     wide = float(np.ptp(values)) > _WIDE * strategy.stepover_m
     if wide or not lines or not _turns_over(part):
@@ -84,7 +91,7 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
     """A distance (v,) across a part, m, and its lines: those that are longest and most even."""
     mesh = part.mesh
     if is_band(part, strategy):
-        first, last = band_borders(mesh, strategy)
+        first, last = band_borders(part, strategy)
         around = _across_band(part, first, last, strategy.stepover_m)
         return around, lines_at(part, around, strategy)
     chosen, best, most = np.zeros(len(mesh.vertices)), list[MeshLine](), -1.0
@@ -98,9 +105,11 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
     for across in across_directions(part, along):
         height = height_over_middle(part, across)
         # Around a closed part the plane's lines are followed, around bends as well.
-        ways = (
+        ways: tuple[Callable[[FineMesh, np.ndarray], np.ndarray], ...] = (
             (distance_across,) if part.outward is not None else (signed_distance, distance_across)
         )
+        if even_share(mesh, height, _STEEP) > _ALL:
+            ways = (_as_it_is,)  # on a plane a height is a distance already
         for way in ways:
             distance = way(mesh, height)
             lines = lines_at(part, distance, strategy, tail=_TAIL if narrow else SPIKE)
@@ -117,6 +126,10 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
     return chosen, best
 
 
+def _as_it_is(_: FineMesh, height: np.ndarray) -> np.ndarray:
+    return height
+
+
 def usual_length(lines: Sequence[MeshLine]) -> float:
     """Mean length of the line that a place of the lines is on, m: short pieces count little."""
     length = np.array([total_length(line.points) for line in lines])
@@ -129,7 +142,8 @@ def line_direction(part: Part, direction: np.ndarray | None) -> np.ndarray:
     Raises ProcessError for one that stands on it.
     """
     if direction is None:
-        along = part.axes[0]
+        sides = main_direction(part)
+        along = part.axes[0] if sides is None else sides
     else:
         along = unit_vectors(np.asarray(direction, dtype=np.float64)[None])[0]
     if part.outward is None:

@@ -29,11 +29,14 @@ _SMALL, _NARROW = 0.5, 0.6  # of the footprint's area; of a stepover
 _FACES = float(np.cos(np.radians(45.0)))  # of a closed sheet: which of it is its top
 _FLAT = float(np.cos(np.radians(20.0)))  # of its top, which stays whole
 _ROUND = 0.75  # of the normals' spread in one direction: that of a round section is a half
-_SLENDER = 1.2  # times as long as its section is around
+_SLENDER = 1.6  # times as long as its section is around
 _END = 0.5  # of how wide a strip is: how far its ends reach
 _ALIKE_LONG, _BAND = 0.6, 4.0
 """A closed sheet is a band where its two borders are alike in length, by that share, and that many
 stepovers apart at most."""
+_SHORT, _CONE = 1.0, 0.35
+"""Of its border's length: how long a round sheet is that is worked around, at most; and how long
+its other border is, at least."""
 _SIDES = unit_vectors(
     np.array(
         [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z],
@@ -86,8 +89,10 @@ def felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndar
     of a cell that is a fraction of the tool and look to one side."""
     cell = np.floor((mesh.centres - mesh.centres.min(axis=0)) * (_PER_RADIUS / radius_m))
     side = (mesh.normals @ _SIDES.T).argmax(axis=1)
-    key = np.column_stack([cell.astype(np.int64), side])
-    _, number = np.unique(key, axis=0, return_inverse=True)
+    cell = cell.astype(np.int64)
+    count = cell.max(axis=0) + 1
+    key = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES) + side
+    _, number = np.unique(key, return_inverse=True)
     number = number.reshape(-1)
     total = np.maximum(np.bincount(number, mesh.areas), 1e-300)
     centre = np.stack(
@@ -105,27 +110,37 @@ def is_round_rod(part: Part) -> bool:
     if part.outward is not None:
         return False
     mesh = part.mesh
-    spread = (mesh.normals * mesh.areas[:, None]).T @ mesh.normals / mesh.areas.sum()
-    if np.linalg.eigvalsh(spread)[-1] > _ROUND:
+    if not _is_round(part):
         return False
     return ends_of(mesh).length_m ** 2 > _SLENDER * float(mesh.areas.sum())
 
 
+def _is_round(part: Part) -> bool:
+    mesh = part.mesh
+    spread = (mesh.normals * mesh.areas[:, None]).T @ mesh.normals / mesh.areas.sum()
+    return bool(np.linalg.eigvalsh(spread)[-1] <= _ROUND)
+
+
 def is_band(part: Part, strategy: Strategy) -> bool:
-    """Whether a part is a closed narrow band between two borders, as the edge of a round table."""
-    return part.outward is None and len(band_borders(part.mesh, strategy)) == 2
+    """Whether a part is a closed band between two borders, as the edge of a round table or a wide
+    cone: narrow, or round and no longer than it is around."""
+    return part.outward is None and len(band_borders(part, strategy)) == 2
 
 
-def band_borders(mesh: FineMesh, strategy: Strategy) -> list[np.ndarray]:
-    """The vertices (b,) of each of the two long borders that a narrow band has; none otherwise."""
-    loops, lengths = mesh.border_loops()
+def band_borders(part: Part, strategy: Strategy) -> list[np.ndarray]:
+    """The vertices (b,) of each of the two long borders that a band has; none otherwise."""
+    loops, lengths = part.mesh.border_loops()
     if len(loops) < 2:
         return []
     first, second = np.argsort(-lengths)[:2]
-    across = float(mesh.areas.sum()) / float(lengths[first])
-    if lengths[second] < _ALIKE_LONG * lengths[first] or across > _BAND * strategy.stepover_m:
-        return []
-    return [loops[first], loops[second]]
+    across = float(part.mesh.areas.sum()) / float(lengths[first])
+    narrow = (
+        across <= _BAND * strategy.stepover_m and lengths[second] >= _ALIKE_LONG * lengths[first]
+    )
+    short = across <= _SHORT * lengths[first] and lengths[second] >= _CONE * lengths[first]
+    if narrow or (short and _is_round(part) and not is_round_rod(part)):
+        return [loops[first], loops[second]]
+    return []
 
 
 def width(mesh: FineMesh) -> float:
