@@ -26,7 +26,16 @@ from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
 from nrdf.toolpath.planners.ordering import snake_order
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.reeb_graph import touching_faces
-from nrdf.toolpath.planners.rod_sections import RodFrame, Section, at_shares, lengths_at, nearest_on_section, sections, straightened, untorn
+from nrdf.toolpath.planners.rod_sections import (
+    RodFrame,
+    Section,
+    at_shares,
+    lengths_at,
+    nearest_on_section,
+    sections,
+    straightened,
+    untorn,
+)
 from nrdf.toolpath.planners.rod_skeleton import split_at_branches
 from nrdf.toolpath.planners.sheet_lines import sheet_lines
 from nrdf.toolpath.planners.sheets import sheets_of
@@ -165,7 +174,7 @@ def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> li
     paths, numbers = [], []
     for k in range(len(shares)):
         on = np.flatnonzero(good[:, k])
-        far = steplengths_at(places[on, k]) > _STEP * strategy.spacing_m
+        far = step_lengths(places[on, k]) > _STEP * strategy.spacing_m
         far |= np.diff(np.array(there)[on]) > 2
         for run in np.split(on, np.flatnonzero(far) + 1):
             if len(run) > 1 and total_length(places[run, k]) >= strategy.tool_radius_m:

@@ -234,7 +234,9 @@ def at_shares(section: Section, shares: np.ndarray, closed: bool) -> np.ndarray:
     return flat
 
 
-def nearest_on_section(section: Section, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nearest_on_section(
+    section: Section, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The nearest places (k, 3) of a section to places (k, 2) in the frame, their triangles (k,),
     and how far they are, m."""
     on = np.flatnonzero(section.faces >= 0)
