@@ -53,7 +53,7 @@ def test_what_has_no_surface_is_refused(cloud, radius, message):
 def test_points_far_apart_become_a_closed_mesh_and_an_open_plate_stays_open():
     stick = trimesh.creation.box((0.4, 0.05, 0.05))
     points, face = trimesh.sample.sample_surface(stick, 800, seed=0)
-    found = object_mesh(PointCloud(points, stick.face_normals[face], "m"), 0.02)
+    found = object_mesh(PointCloud(points, stick.face_normals[face], "m"), 0.01)
     assert boundary_loops(found.faces) == []
     rng = np.random.default_rng(0)
     plate = np.column_stack([rng.uniform(0, 0.4, 900), rng.uniform(0, 0.3, 900), np.zeros(900)])

@@ -14,7 +14,8 @@ from nrdf.surface.target_mesh import TargetMesh
 
 _EDGES_PER_RADIUS = 5  # of the tool: finer than it can follow only costs time
 _ASKED, _NEIGHBOURS = 4000, 8  # points that a mesh is judged by; those that tell their spacing
-_SPARSE = 1.25  # edges that points of a sparse cloud are apart, at least
+_SPARSE = 2.5  # edges that points of a sparse cloud are apart, at least
+_CRACKED = 20.0  # spacings of border from which a mesh of sparse points is full of cracks
 _OFF, _WORSE = 0.6, 0.02  # spacings from which a point has no surface; share of them that decides
 
 
@@ -49,7 +50,7 @@ def _of_points(cloud: PointCloud, edge_m: float) -> TargetMesh:
     some = np.linspace(0, len(points) - 1, min(_ASKED, len(points))).astype(int)
     away = cKDTree(points).query(points[some], [_NEIGHBOURS + 1])[0]
     spacing = float(np.median(away)) * np.sqrt(np.pi / _NEIGHBOURS)
-    if spacing <= _SPARSE * edge_m:
+    if spacing <= _SPARSE * edge_m or _border_length(mesh) <= _CRACKED * spacing:
         return mesh
     try:
         closed = poisson_mesh(points, normals)
