@@ -168,7 +168,9 @@ def _on_few_turns(
     while True:
         others = {int(index[row]) for some in runs.values() for row, *_ in some} - used
         found = [(*best({*used, other}), other) for other in sorted(others)]
-        if not found or (least_cost := min(entry[0] for entry in found)) > cost - _TURN:
+        # The first one is no turn of the object: it stands some way anyhow.
+        gain = _TURN if used else 0.5
+        if not found or (least_cost := min(entry[0] for entry in found)) > cost - gain:
             return chosen
         cost, chosen, other = next(entry for entry in found if entry[0] == least_cost)
         used.add(other)
