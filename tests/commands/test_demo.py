@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from nrdf import cli
-from nrdf.bundled import REAL, bundled_chair
+from nrdf.bundled import REAL, bundled_chair, bundled_mesh
 from nrdf.io.cloud import read_cloud
 from nrdf.io.result_folder import MANIFEST
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.transfer_result import MIN_CONFIDENCE
+from nrdf.reports.job_meshes import read_job_meshes
 
 
 def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path, monkeypatch):
@@ -33,6 +34,11 @@ def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path
     # The scan lies as it was scanned; the job says how the chair stands in it.
     job = json.loads((out / REAL / "toolpaths.json").read_text())
     np.testing.assert_allclose(job["pose"]["up"], [0, 0, 1], atol=0.02)
+    # Paths are planned on the scan, and compared with the mesh that was scanned.
+    surface = read_job_meshes(out / REAL).surface
+    assert len(surface.faces) > 10 * len(bundled_mesh().faces)
+    off = [r["true_distance_99_m"] for r in real if r["true_distance_99_m"] is not None]
+    assert len(off) and 1e-4 < max(off) < 0.05
     for row in rows:
         _, truth = bundled_chair(row["chair"])
         assert row["true"] == int(truth[row["region"]].sum())

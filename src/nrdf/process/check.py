@@ -15,7 +15,7 @@ from nrdf.process.process import Process
 from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import normals_under, taught_segments
-from nrdf.surface.given_surface import GivenSurface, given_surface
+from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.metrics import ToolPathMetrics, measure_path
@@ -49,7 +49,6 @@ def check_knowledge(
 ) -> list[CheckedProcess]:
     """Plan and measure every process on the reference; `progress` is called with (done, all)."""
     reference = ReferencePaths(bound_knowledge)
-    given = given_surface(reference.cloud)
     steps = [(region.name, p) for region in bound_knowledge.knowledge.regions for p in region.steps]
     checked = []
     for done, (name, process) in enumerate(steps, 1):
@@ -58,7 +57,7 @@ def check_knowledge(
         except ProcessError as error:
             checked.append(CheckedProcess(name, process, str(error)))
         else:
-            checked.append(check_process(region, name, process, given))
+            checked.append(check_process(region, name, process, reference.given))
         if progress is not None:
             progress(done, len(steps))
     return checked

@@ -27,9 +27,11 @@ class Votes:
 
 @dataclass(frozen=True)
 class ObjectSurface:
-    """mesh: the object's own, or made of its points. warnings: why it is not the one given."""
+    """mesh: the object's own, or made of its points. skin: the same where it is the object's own,
+    else None. warnings: why it is not the one given."""
 
     mesh: TargetMesh
+    skin: TargetMesh | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -43,11 +45,12 @@ def object_surface(cloud: PointCloud, knowledge: Knowledge) -> ObjectSurface:
     if cloud.mesh is None:
         return ObjectSurface(object_mesh(cloud, radius))
     try:
-        return ObjectSurface(object_mesh(cloud, radius))
+        skin = object_mesh(cloud, radius)
+        return ObjectSurface(skin, skin)
     except ProcessError as error:
         made = object_mesh(replace(cloud, mesh=None), radius)
         said = f"the mesh as given is not used, but one made of its points: {error}"
-        return ObjectSurface(made, (said,))
+        return ObjectSurface(made, warnings=(said,))
 
 
 def regions_on(mesh: TargetMesh, votes: Votes, knowledge: Knowledge) -> RegionMeshes:

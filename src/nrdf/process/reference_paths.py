@@ -8,6 +8,7 @@ from threading import RLock
 
 import numpy as np
 
+from nrdf.errors import ProcessError
 from nrdf.field.cloud_encoder import WORKING_POINTS
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import distinct_points, downsample, indices_in_subset
@@ -23,7 +24,7 @@ from nrdf.process.object_regions import (
 from nrdf.process.process import Process
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import taught_segments
-from nrdf.surface.given_surface import with_normals_of
+from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.surface.region_mesh import RegionMesh, RegionMeshes
 from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.tool_segments import contact_points
@@ -65,6 +66,15 @@ class ReferencePaths:
     def surface(self) -> ObjectSurface:
         """The reference's mesh. Raises ProcessError where none can be made."""
         return object_surface(self.cloud, self.bound_knowledge.knowledge)
+
+    @cached_property
+    def given(self) -> GivenSurface:
+        """The reference as the user gave it, which paths are compared with."""
+        try:
+            skin = self.surface.skin
+        except ProcessError:
+            skin = None
+        return given_surface(self.cloud, skin)
 
     @cached_property
     def regions(self) -> RegionMeshes:

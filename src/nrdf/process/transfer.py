@@ -47,7 +47,7 @@ from nrdf.regions.match import Match
 from nrdf.regions.model import Model, load_model
 from nrdf.regions.region import region_indices
 from nrdf.scans.kind_check import KindCheck
-from nrdf.surface.given_surface import given_surface, with_normals_of
+from nrdf.surface.given_surface import GivenSurface, given_surface, with_normals_of
 from nrdf.toolpath.types import Segment
 
 log = logging.getLogger(__name__)
@@ -86,6 +86,7 @@ class ProcessTransfer:
         target_warnings: Sequence[str] | None = None,
         whole: PointCloud | None = None,
         kind: KindCheck | None = None,
+        given: GivenSurface | None = None,
     ) -> TransferResult:
         """Find the regions on a target, and bring every process there.
 
@@ -105,6 +106,8 @@ class ProcessTransfer:
                 unit is checked here, and logged as a warning where it is uncertain.
             whole: the target before it was thinned, in metres, which tool paths are compared with.
             kind: what the target was found to look like; checked here unless given.
+            given: what the tool paths are compared with, and nothing is planned on; the target as
+                it was given, unless given.
 
         Raises:
             CloudError: the target cannot be used.
@@ -139,9 +142,9 @@ class ProcessTransfer:
         start = time.perf_counter()
         correspondence = Correspondence(self.reference_surface, encoded)
         up = np.eye(3)[1] if encoded.pose is None else encoded.pose.rotation[:, 1]
-        target_paths = TargetPaths(
-            self.reference_paths, correspondence, given_surface(complete), up
-        )
+        if given is None:
+            given = given_surface(complete, None if surface is None else surface.skin)
+        target_paths = TargetPaths(self.reference_paths, correspondence, given, up)
         paths = target_paths.all(self.steps(), found, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})

@@ -41,7 +41,7 @@ class PaintableCloud:
         given = cloud.normals
         self.normals = estimate_normals(self.points) if given is None else given[self.shown]
         self.surface = Surface(self.points, self.normals)
-        self._meshes: dict[float, TargetMesh] = {}
+        self._meshes: dict[float | None, TargetMesh] = {}
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
 
     @property
@@ -72,9 +72,10 @@ class PaintableCloud:
 
         Raises ProcessError where no mesh can be made, or nothing of the region is left on it.
         """
-        if tool_radius_m not in self._meshes:
-            self._meshes = {tool_radius_m: object_mesh(self._with_normals, tool_radius_m)}
-        mesh = self._meshes[tool_radius_m]
+        key = None if self.cloud.mesh is not None else tool_radius_m  # an own mesh fits any tool
+        if key not in self._meshes:
+            self._meshes = {key: object_mesh(self._with_normals, tool_radius_m)}
+        mesh = self._meshes[key]
         return region_mesh(mesh, self.points, self.normals, mask.astype(float), tool_radius_m)
 
     @cached_property
