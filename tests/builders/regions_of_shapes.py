@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -135,3 +135,13 @@ def flipped(region: RegionMesh) -> RegionMesh:
     faces = region.mesh.faces[:, ::-1].copy()
     mesh = TargetMesh(region.mesh.vertices, faces, ())
     return RegionMesh.from_faces(mesh, np.ones(len(faces), bool))
+
+
+def flat_bars(bars: Sequence[tuple[float, float, float, float]]) -> RegionMesh:
+    """Rectangles (x, y, width, height) in the plane z = 0 that touch without being sewn."""
+    corners = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)])
+    vertices = np.concatenate([(x, y, 0.0) + corners * (w, h, 0.0) for x, y, w, h in bars])
+    faces = np.array([(0, 1, 2), (0, 2, 3)])
+    every = np.concatenate([faces + 4 * k for k in range(len(bars))])
+    mesh = TargetMesh(vertices, every)
+    return RegionMesh(mesh, mesh)

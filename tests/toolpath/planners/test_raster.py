@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from builders.regions_of_shapes import bend, cap, plate, plate_with_hole, tube
+from builders.regions_of_shapes import bend, cap, flat_bars, plate, plate_with_hole, tube
 from nrdf.errors import ProcessError
 from nrdf.geometry.polylines import total_length
 from nrdf.toolpath.planners.raster import plan_cross_hatch, plan_raster
@@ -58,3 +58,17 @@ def test_cross_hatch_is_two_rasters():
     spread = np.array([np.ptp(path.contacts, axis=0)[:2] for path in paths])
     assert ((spread[:, 0] > 0.05) ^ (spread[:, 1] > 0.05)).all()
     assert (spread[:, 0] > 0.35).sum() >= 10 and (spread[:, 1] > 0.25).sum() >= 14
+
+
+def test_slats_between_rails_are_worked_whatever_the_direction():
+    """Lines across a slat would be shorter than the tool: they are left out, so it has its own."""
+    rails = [(0.0, 0.0, 0.4, 0.06), (0.0, 0.36, 0.4, 0.06)]
+    middles = [0.08, 0.2, 0.32]
+    region = flat_bars([*rails, *((x - 0.015, 0.06, 0.03, 0.3) for x in middles)])
+    strategy = Strategy(
+        stepover_m=0.035, spacing_m=0.01, tool_radius_m=0.03, direction=np.array([1.0, 0.0, 0.0])
+    )
+    contacts = np.concatenate([path.contacts for path in plan_raster(region, strategy)])
+    for x in middles:
+        away = np.linalg.norm(contacts[:, :2] - [x, 0.21], axis=1)
+        assert away.min() < strategy.tool_radius_m

@@ -60,7 +60,7 @@ def _sheet_paths(
         if strokes:
             return strokes
     paths = driven(region, sheet, sheet_lines(region, sheet, strategy, beside), strategy)
-    if not paths or sheet.slits or width(sheet.mesh) > _FRAME * strategy.stepover_m:
+    if not paths or width(sheet.mesh) > _FRAME * strategy.stepover_m:
         return paths
     radius = strategy.tool_radius_m
     left = ~reached_from_paths(sheet, [*beside, *paths], radius)
