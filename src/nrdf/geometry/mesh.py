@@ -47,6 +47,18 @@ class Skin:
     face: np.ndarray
 
 
+def triangle_crosses(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Along the normals (f, 3) of triangles, twice their areas long, of vertices (v, 3), faces
+    (f, 3)."""
+    a, b, c = (vertices[corner] for corner in faces.T)
+    return np.cross(b - a, c - a)
+
+
+def triangle_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Areas (f,) of triangles, of vertices (v, 3), faces (f, 3)."""
+    return np.asarray(np.linalg.norm(triangle_crosses(vertices, faces), axis=1) / 2.0)
+
+
 def check_coordinate_range(points: np.ndarray) -> None:
     """Raise DataError for points (n, 3), finite, with coordinates beyond those of any object."""
     if (largest := max(points.max(initial=0.0), -points.min(initial=0.0))) > MAX_COORDINATE:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import igl
 import numpy as np
 
+from nrdf.geometry.mesh import triangle_areas
+
 _SHARP_DEG = 35.0
 _LARGER = 1.2  # factor by which cells grow until few enough triangles are left
 
@@ -17,8 +19,7 @@ def simplified(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.n
     """
     if len(faces) <= most:
         return vertices, faces
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    area = float(triangle_areas(vertices, faces).sum())
     cell = float(np.sqrt(2.0 * area / most))
     while True:
         kept, left = _clustered(vertices, faces, cell)

@@ -9,6 +9,8 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from nrdf.geometry.mesh import triangle_areas, triangle_crosses
+
 MOST_FACES = 50_000
 """Faces of a refined mesh, about; larger regions are planned in larger triangles."""
 _ROUNDS, _FLIPS, _FIRST_FLIPS = 24, 3, 12
@@ -122,8 +124,7 @@ class FineMesh:
 
     @cached_property
     def _crossed(self) -> np.ndarray:
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return np.cross(b - a, c - a)
+        return triangle_crosses(self.vertices, self.faces)
 
 
 def refine(
@@ -141,8 +142,7 @@ def refine(
     """
     origin = np.arange(len(faces))
     wanted = np.ones(len(faces), bool) if wanted is None else np.asarray(wanted)
-    a, b, c = (vertices[faces[wanted, k]] for k in range(3))
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    area = float(triangle_areas(vertices, faces[wanted]).sum())
     edge_m = max(edge_m, float(np.sqrt(area / (_OF_SQUARE * most_faces))))
     flat = _FLAT * float(np.ptp(vertices, axis=0).max())
     for _ in range(_FIRST_FLIPS):

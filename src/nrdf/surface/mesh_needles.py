@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from nrdf.geometry.mesh import triangle_crosses
+
 _FLAT = 2e-7  # longest sides, the height up to which a triangle counts as a line
 _OFF = 4e-6  # longest sides that the surface may move
 _ALIKE = 0.9  # least cosine between a face's normal before and after
@@ -109,7 +111,7 @@ def _may(
         return False
     before = faces[ring[~shared]]
     after = np.where(before == gone, kept, before)
-    was, now = _crossed(vertices, before), _crossed(vertices, after)
+    was, now = triangle_crosses(vertices, before), triangle_crosses(vertices, after)
     was_flat, is_flat = _flat(vertices, before, size), _flat(vertices, after, size)
     if (is_flat & ~was_flat).any():
         return False
@@ -124,10 +126,5 @@ def _may(
 def _flat(vertices: np.ndarray, faces: np.ndarray, size: float) -> np.ndarray:
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
-    crossed = np.linalg.norm(_crossed(vertices, faces), axis=1)
+    crossed = np.linalg.norm(triangle_crosses(vertices, faces), axis=1)
     return np.asarray(crossed <= _FLAT * size * longest)
-
-
-def _crossed(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    a, b, c = (vertices[corner] for corner in faces.T)
-    return np.cross(b - a, c - a)

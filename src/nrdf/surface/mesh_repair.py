@@ -10,7 +10,14 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.mesh import check_coordinate_range, check_mesh, clean_mesh, outer_skin
+from nrdf.geometry.mesh import (
+    check_coordinate_range,
+    check_mesh,
+    clean_mesh,
+    outer_skin,
+    triangle_areas,
+    triangle_crosses,
+)
 from nrdf.geometry.winding import MeshWindingNumber
 from nrdf.surface.mesh_needles import without_needles
 from nrdf.surface.mesh_sewing import sheets_apart
@@ -97,7 +104,7 @@ def hidden_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     above its middle is that of the inside.
     """
     corners = vertices[faces]
-    normals = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normals = unit_vectors(triangle_crosses(vertices, faces))
     above = _OFF * float(np.ptp(vertices, axis=0).max()) * normals
     tree = igl.AABB()
     tree.init(vertices, faces)
@@ -143,8 +150,7 @@ def _leaving(
 
 def _met_by_lines(vertices: np.ndarray, faces: np.ndarray) -> float:
     """How many faces a line meets that meets the mesh's box, on average (Crofton's formula)."""
-    a, b, c = (vertices[corner] for corner in faces.T)
-    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0
+    area = float(triangle_areas(vertices, faces).sum())
     x, y, z = np.ptp(vertices, axis=0)
     return area / max(float(x * y + y * z + z * x), 1e-300)
 

@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.mesh import triangle_areas
 from nrdf.surface.fine_mesh import edges_of, split_edges
 from nrdf.surface.mesh_edges import boundary_loops, opposite_half_edges
 
@@ -225,7 +226,8 @@ def capped(
         return vertices, faces
     vertices = np.concatenate([vertices, added])
     cap = np.concatenate(caps)
-    if _area(vertices, cap) > largest_share * _area(vertices, faces):
+    area = triangle_areas(vertices, faces).sum()
+    if triangle_areas(vertices, cap).sum() > largest_share * area:
         return None
     return vertices, np.concatenate([faces, cap])
 
@@ -241,8 +243,3 @@ def thickened(
     rim = [np.stack([b, a, a + count], axis=1), np.stack([b, a + count, b + count], axis=1)]
     back = vertices - thickness * unit_vectors(normals)
     return np.concatenate([vertices, back]), np.concatenate([faces, faces[:, ::-1] + count, *rim])
-
-
-def _area(vertices: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices[corner] for corner in faces.T)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from nrdf.geometry.mesh import triangle_crosses
 from nrdf.surface.mesh_edges import opposite_half_edges
 
 _SHORT, _FLAT = 1e-6, 2e-6  # longest sides: edges, and heights of triangles, that go
@@ -23,9 +24,7 @@ def without_slivers(
     for _ in range(_ROUNDS):
         corners = vertices[faces]
         sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        double = np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-        )
+        double = np.linalg.norm(triangle_crosses(vertices, faces), axis=1)
         short = sides < _SHORT * size
         flat = double < _FLAT * size * sides.max(axis=1)
         if short.any():

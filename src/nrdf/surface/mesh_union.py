@@ -8,6 +8,7 @@ import igl
 import manifold3d
 import numpy as np
 
+from nrdf.geometry.mesh import triangle_areas
 from nrdf.surface.mesh_sewing import (
     capped,
     crowded_edges_divided,
@@ -70,7 +71,11 @@ def united(vertices: np.ndarray, faces: np.ndarray) -> United:
             break
         lost = seen.lost(made.vertices, made.faces)
         if lost.sum() <= _SEEN_LOST * len(lost):
-            covered = max(_area(given.vertices, given.faces) - _area(made.vertices, made.faces), 0)
+            covered = max(
+                float(triangle_areas(given.vertices, given.faces).sum())
+                - float(triangle_areas(made.vertices, made.faces).sum()),
+                0,
+            )
             return replace(made, origin=origin[made.origin], covered=float(covered))
         hiding = _hiding(bodies, seen.points[lost], own[lost])
         for number in hiding:
@@ -197,8 +202,3 @@ def _triangles(body: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray, np.nd
     merged[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
     named = name < _UNNAMED
     return vertices, merged[faces[named]], name[named]
-
-
-def _area(vertices: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices[corner] for corner in faces.T)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2.0

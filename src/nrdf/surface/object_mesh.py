@@ -7,7 +7,6 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.io.cloud import PointCloud
-from nrdf.surface.mesh_edges import opposite_half_edges
 from nrdf.surface.poisson_mesh import poisson_mesh
 from nrdf.surface.scan_mesh import mesh_from_scan
 from nrdf.surface.target_mesh import TargetMesh
@@ -50,25 +49,15 @@ def _of_points(cloud: PointCloud, edge_m: float) -> TargetMesh:
     some = np.linspace(0, len(points) - 1, min(_ASKED, len(points))).astype(int)
     away = cKDTree(points).query(points[some], [_NEIGHBOURS + 1])[0]
     spacing = float(np.median(away)) * np.sqrt(np.pi / _NEIGHBOURS)
-    if spacing <= _SPARSE * edge_m or _border_length(mesh) <= _CRACKED * spacing:
+    if spacing <= _SPARSE * edge_m or mesh.border_length <= _CRACKED * spacing:
         return mesh
     try:
         closed = poisson_mesh(points, normals)
     except ProcessError:
         return mesh
-    missed, border = [], []
-    for made in (closed, mesh):
-        off = made.nearest(points[some], normals[some]).distances
-        missed.append(float((off > _OFF * spacing).mean()))
-        border.append(_border_length(made))
-    good = border[0] <= border[1] and missed[0] <= missed[1] + _WORSE
+    missed = [
+        float((made.nearest(points[some], normals[some]).distances > _OFF * spacing).mean())
+        for made in (closed, mesh)
+    ]
+    good = closed.border_length <= mesh.border_length and missed[0] <= missed[1] + _WORSE
     return closed if good else mesh
-
-
-def _border_length(mesh: TargetMesh) -> float:
-    """Length, m, of the edges of a single face."""
-    start = mesh.faces.reshape(-1)
-    stop = np.roll(mesh.faces, -1, axis=1).reshape(-1)
-    alone = opposite_half_edges(mesh.faces) < 0
-    way = mesh.vertices[start[alone]] - mesh.vertices[stop[alone]]
-    return float(np.linalg.norm(way, axis=1).sum())

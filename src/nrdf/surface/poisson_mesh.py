@@ -10,7 +10,9 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.mesh import triangle_areas
 from nrdf.surface.scan_ends import trimmed
+from nrdf.surface.scan_grid import CUBE_CORNERS
 from nrdf.surface.scan_mesh import on_surface
 from nrdf.surface.scan_points import smooth_points
 from nrdf.surface.target_mesh import TargetMesh
@@ -21,9 +23,6 @@ _MARGIN = 4.0  # spacings around the object
 _FARTHEST = 2.5  # spacings from the nearest point that a face may be
 _SETTLED = 0.35  # spacings that a vertex is moved onto the points' planes, at most
 _MOST_CELLS = 24_000_000
-_CORNERS = np.array(
-    [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-)
 
 
 def poisson_mesh(points: np.ndarray, normals: np.ndarray) -> TargetMesh:
@@ -58,8 +57,7 @@ def poisson_mesh(points: np.ndarray, normals: np.ndarray) -> TargetMesh:
     way = np.linalg.norm(moves, axis=1, keepdims=True)
     vertices = vertices + moves * np.minimum(1.0, limit / np.maximum(way, 1e-12))
     past = tree.query(vertices)[0] / spacing
-    a, b, c = (vertices[corner] for corner in faces.T)
-    size = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0 / spacing**2
+    size = triangle_areas(vertices, faces) / spacing**2
     faces = trimmed(faces, size > 1e-9, past, size)
     used, faces = np.unique(faces, return_inverse=True)
     return TargetMesh(vertices[used], faces.reshape(-1, 3))
@@ -77,11 +75,12 @@ def _indicator(
     waves.append(2.0 * np.pi * fft.rfftfreq(shape[2], cell))
     along = np.ix_(*[wave.astype(np.float32) for wave in waves])
     total = np.zeros((shape[0], shape[1], shape[2] // 2 + 1), np.complex64)
+    corners = [(first + corner).T for corner in CUBE_CORNERS]
+    weights = [np.prod(np.abs(1.0 - corner - part), axis=1) for corner in CUBE_CORNERS]
     for axis in range(3):
         spread = np.zeros(shape, np.float32)
-        for corner in _CORNERS:
-            weight = np.prod(np.abs(1.0 - corner - part), axis=1) * flux[:, axis]
-            np.add.at(spread, tuple((first + corner).T), weight)
+        for corner, weight in zip(corners, weights, strict=True):
+            np.add.at(spread, tuple(corner), weight * flux[:, axis])
         total += 1j * along[axis] * fft.rfftn(spread, workers=2)
     square = along[0] ** 2 + along[1] ** 2 + along[2] ** 2
     square[0, 0, 0] = 1.0
@@ -97,7 +96,7 @@ def _zero_surface(
     shape = inside.shape
     within = inside > 0.0
     count = np.zeros(tuple(side - 1 for side in shape), np.int8)
-    for corner in _CORNERS:
+    for corner in CUBE_CORNERS:
         count += within[
             tuple(slice(a, a + side - 1) for a, side in zip(corner, shape, strict=True))
         ]
@@ -107,15 +106,14 @@ def _zero_surface(
     cells = cells[away < reach]
     if not len(cells):
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    index = np.ravel_multi_index(tuple((cells[:, None] + _CORNERS).reshape(-1, 3).T), shape)
+    index = np.ravel_multi_index(tuple((cells[:, None] + CUBE_CORNERS).reshape(-1, 3).T), shape)
     used, number = np.unique(index, return_inverse=True)
     places = low + cell * np.stack(np.unravel_index(used, shape), axis=1)
     values = -inside.reshape(-1)[used].astype(np.float64)
     cubes = np.ascontiguousarray(number.reshape(-1, 8))
     vertices, faces = igl.marching_cubes(values, places, cubes, 0.0)[:2]
     vertices, faces = np.asarray(vertices), np.asarray(faces, np.int64)
-    a, b, c = (vertices[corner] for corner in faces.T)
-    real = np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-9 * cell**2
-    faces = faces[real & (tree.query((a + b + c) / 3.0)[0] < farthest)]
+    real = triangle_areas(vertices, faces) > 5e-10 * cell**2
+    faces = faces[real & (tree.query(vertices[faces].mean(axis=1))[0] < farthest)]
     used, faces = np.unique(faces, return_inverse=True)
     return vertices[used], faces.reshape(-1, 3)

@@ -14,7 +14,7 @@ _NEAREST = 8  # points that the distance at a place comes from
 _AGAINST = 0.3  # cosine between normals from which points are of the other side
 _ROUNDS = 8  # of cells added beside those that the surface goes through
 _CODE = np.array([1 << 42, 1 << 21, 1])
-_CORNERS = np.array(
+CUBE_CORNERS = np.array(
     [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 )
 _SIDES = (
@@ -38,14 +38,14 @@ def zero_surface(scan: ScanPoints, tree: cKDTree) -> tuple[np.ndarray, np.ndarra
     cells, corners = np.zeros((2, 0), np.int64)
     distance, far = np.zeros(0), np.zeros(0, bool)
     for _ in range(_ROUNDS):
-        asked = _without(_once(new + (_CORNERS @ _CODE)[:, None]), corners)
+        asked = _without(_once(new + (CUBE_CORNERS @ _CODE)[:, None]), corners)
         found = _distances(scan, tree, _places(asked, origin, scan.cell))
         cells, corners = np.sort(np.concatenate([cells, new])), np.concatenate([corners, asked])
         order = np.argsort(corners, kind="stable")
         corners = corners[order]
         distance = np.concatenate([distance, found[0]])[order]
         far = np.concatenate([far, found[1]])[order]
-        index = np.searchsorted(corners, new[:, None] + _CORNERS @ _CODE)
+        index = np.searchsorted(corners, new[:, None] + CUBE_CORNERS @ _CODE)
         outside, beyond = distance[index] > 0.0, far[index]
         beside = []
         for step, shared in _SIDES:
@@ -55,7 +55,7 @@ def zero_surface(scan: ScanPoints, tree: cKDTree) -> tuple[np.ndarray, np.ndarra
         new = _without(_once(np.concatenate(beside)), cells)
         if not len(new):
             break
-    index = np.searchsorted(corners, cells[:, None] + _CORNERS @ _CODE)
+    index = np.searchsorted(corners, cells[:, None] + CUBE_CORNERS @ _CODE)
     outside = distance[index] > 0.0
     crossed = outside.any(axis=1) & ~outside.all(axis=1) & ~far[index].any(axis=1)
     if not crossed.any():

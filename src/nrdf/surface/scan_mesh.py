@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.mesh import triangle_crosses
 from nrdf.surface.mesh_edges import edge_components
 from nrdf.surface.scan_ends import closed, even_ends, trimmed
 from nrdf.surface.scan_grid import zero_surface
@@ -85,8 +86,7 @@ def _looking_out(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whether faces (f,) look as one of the points that are `nearest` (v,) to their vertices does,
     and their areas (f,)."""
-    a, b, c = (vertices[corner] for corner in faces.T)
-    cross = np.cross(b - a, c - a)
+    cross = triangle_crosses(vertices, faces)
     area = np.linalg.norm(cross, axis=1) / 2.0
     facing = [np.einsum("fa,fa->f", cross, scan.normals[nearest[corner]]) for corner in faces.T]
     return (np.max(facing, axis=0) > 0.0) & (area > _NO_AREA * scan.cell**2), area

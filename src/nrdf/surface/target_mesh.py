@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError, ProcessError
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.mesh import Mesh, triangle_crosses
+from nrdf.surface.mesh_edges import opposite_half_edges
 from nrdf.surface.mesh_repair import repaired_skin
 
 _FACING = 0.5  # least cosine between a face's normal and the side asked for
@@ -93,14 +94,21 @@ class TargetMesh:
         return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
     @cached_property
+    def border_length(self) -> float:
+        """Length of all borders, m: of the edges of a single face."""
+        start, stop = self.faces.reshape(-1), np.roll(self.faces, -1, axis=1).reshape(-1)
+        alone = opposite_half_edges(self.faces) < 0
+        way = self.vertices[start[alone]] - self.vertices[stop[alone]]
+        return float(np.linalg.norm(way, axis=1).sum())
+
+    @cached_property
     def size(self) -> float:
         """Longest side of the bounding box, m."""
         return float(np.ptp(self.vertices, axis=0).max())
 
     @cached_property
     def _cross(self) -> np.ndarray:
-        a, b, c = (self.vertices[corner] for corner in self.faces.T)
-        return np.cross(b - a, c - a)
+        return triangle_crosses(self.vertices, self.faces)
 
     def nearest(self, points: np.ndarray, outward: np.ndarray | None = None) -> NearestPoints:
         """The nearest places on the mesh to points (m, 3), m.

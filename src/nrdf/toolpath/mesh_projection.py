@@ -1,51 +1,31 @@
 """Puts the contacts of tool paths onto the triangles of the target's own mesh.
 
-Paths are planned on a smooth surface that is fitted to at most some ten thousand points. On a thin
-leg that surface is millimetres off the mesh that the user gave.
+Warped waypoints lie on a smooth surface that is fitted to at most some ten thousand points. On a
+thin leg that surface is millimetres off the mesh.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
-from nrdf.errors import ProcessError
-from nrdf.io.cloud import PointCloud
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 
-log = logging.getLogger(__name__)
 AnySegment = TypeVar("AnySegment", bound=Segment)
 
 
-def target_mesh_of(cloud: PointCloud) -> TargetMesh | None:
-    """The mesh that a cloud in metres was sampled from, repaired; None where there is none.
-
-    What cannot be repaired is said as a warning: paths then stay where they were planned.
-    """
-    if cloud.mesh is None:
-        return None
-    try:
-        return TargetMesh.from_mesh(cloud.mesh)
-    except ProcessError as error:
-        log.warning("tool paths are not put onto the mesh: %s", error)
-        return None
-
-
 def on_mesh(
-    segments: Sequence[AnySegment], mesh: TargetMesh | None, strategy: Strategy
+    segments: Sequence[AnySegment], mesh: TargetMesh, strategy: Strategy
 ) -> tuple[AnySegment, ...]:
-    """`project_to_mesh` by a process's settings; without a mesh, the segments as they are.
+    """`project_to_mesh` by a process's settings.
 
     A contact that lies more than the tool's diameter from the mesh is not moved.
     """
-    if mesh is None:
-        return tuple(segments)
     return project_to_mesh(segments, mesh, strategy.standoff_m, 2.0 * strategy.tool_radius_m)
 
 

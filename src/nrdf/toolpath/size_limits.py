@@ -44,7 +44,7 @@ def estimate_size(region: RegionMesh, strategy: Strategy) -> PlanSize:
     length = sweeps * area / stepover
     lines = max(length / long, sweeps)
     if strategy.trajectory == "edge":
-        length = sum(region.loop_length(loop) for loop in region.boundary_loops)
+        length = region.mesh.border_length
         lines = len(region.boundary_loops)
     rising = 2.0 * strategy.run_off_m * lines
     return PlanSize(

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.mesh import triangle_crosses
 from nrdf.viz.canvas import Canvas, counted
 from nrdf.viz.palette import AIR_MOVES, INSIDE
 from nrdf.viz.view import OVERSAMPLING, eye_dome, reduced
@@ -254,8 +255,7 @@ def _merged(mesh: Triangles) -> tuple[np.ndarray, np.ndarray]:
     vertices = np.asarray(mesh.vertices, np.float64)
     unique, index = np.unique(np.round(vertices, 7), axis=0, return_inverse=True)
     faces = index.reshape(-1)[np.asarray(mesh.faces, np.int64)]
-    a, b, c = (unique[faces[:, k]] for k in range(3))
-    return unique, np.ascontiguousarray(faces[np.cross(b - a, c - a).any(axis=1)])
+    return unique, np.ascontiguousarray(faces[triangle_crosses(unique, faces).any(axis=1)])
 
 
 def _sharp_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -266,5 +266,4 @@ def _sharp_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def _normals(vertices: np.ndarray, faces: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Outward normals (k, 3) of the triangles nearest to places (k, 3)."""
     _, face, _ = igl.point_mesh_squared_distance(places, vertices, faces)
-    a, b, c = (vertices[faces[face, k]] for k in range(3))
-    return unit_vectors(np.cross(b - a, c - a))
+    return unit_vectors(triangle_crosses(vertices, faces[face]))

@@ -67,11 +67,6 @@ class RegionMatch:
         mesh = TargetMesh.from_mesh(Mesh(target.vertices, target.faces))
         middle = mesh.vertices[mesh.faces].mean(axis=1)
         truth = RegionMesh.from_faces(mesh, target.regions[region][target.nearest_faces(middle)])
-        ratio = border_length(planned) / max(border_length(truth), 1e-9)
+        ratio = planned.mesh.border_length / max(truth.mesh.border_length, 1e-9)
         iou = float((on & given).sum() / max(int((on | given).sum()), 1))
-        return RegionMatch(on[own], ratio if border_length(truth) > 0.0 else None, iou)
-
-
-def border_length(region: RegionMesh) -> float:
-    """Length of all borders of a region, m."""
-    return float(sum(region.loop_length(loop) for loop in region.boundary_loops))
+        return RegionMatch(on[own], ratio if truth.mesh.border_length > 0.0 else None, iou)

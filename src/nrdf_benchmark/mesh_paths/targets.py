@@ -16,7 +16,14 @@ from scipy.sparse.csgraph import connected_components
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
-from nrdf.geometry.mesh import Skin, check_mesh, clean_faces, outer_skin
+from nrdf.geometry.mesh import (
+    Skin,
+    check_mesh,
+    clean_faces,
+    outer_skin,
+    triangle_areas,
+    triangle_crosses,
+)
 from nrdf.io.formats.meshes import load_mesh
 from nrdf.toolpath.strategy import Strategy
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh, read_labels, read_objects
@@ -54,9 +61,7 @@ class MeshTarget:
     @cached_property
     def point_area_m2(self) -> float:
         """The area that a point of the skin stands for."""
-        corners = self.vertices[self.faces]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return float(0.5 * np.linalg.norm(cross, axis=1).sum() / SAMPLES)
+        return float(triangle_areas(self.vertices, self.faces).sum() / SAMPLES)
 
     def indices(self, region: str) -> np.ndarray:
         """Which of the skin's points (k,) lie on a region."""
@@ -148,9 +153,8 @@ def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str
     """A car with bonnet, roof and right door, told by the place and normal of the faces."""
     vertices = _scaled(vertices, 1.0)
     faces = _outward(vertices, faces)
-    corners = vertices[faces]
-    centre = corners.mean(axis=1)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    centre = vertices[faces].mean(axis=1)
+    cross = triangle_crosses(vertices, faces)
     normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
     low, high = vertices[:, 1].min(), vertices[:, 1].max()
     height = (centre[:, 1] - low) / (high - low)  # 0 to 1

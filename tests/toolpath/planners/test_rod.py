@@ -11,10 +11,15 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.planners.field_lines import Part, parts_of
 from nrdf.toolpath.planners.raster import plan_raster
-from nrdf.toolpath.planners.rod import is_rod, plan_rod, rods_of
+from nrdf.toolpath.planners.rod import plan_rod, rods_of
 from nrdf.toolpath.strategy import Strategy
 
 STRATEGY = Strategy(stepover_m=0.02, spacing_m=0.01, tool_radius_m=0.012)
+
+
+def is_rod(part: Part) -> bool:
+    rods, rest = rods_of(part)
+    return bool(rods) and not rest and all(rod.closed for rod in rods)
 
 
 @pytest.mark.parametrize(("region", "length", "most"), [(tube(), 0.4, 10), (bend(), 0.28, 7)])

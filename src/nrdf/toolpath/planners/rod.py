@@ -79,12 +79,6 @@ class Rod:
         return float(np.median(gaps)) < _OPEN
 
 
-def is_rod(part: Part, spacing_m: float = 0.01) -> bool:
-    """Whether strokes along it are what anybody would run: long, thin, and closed around itself."""
-    rods, rest = rods_of(part, spacing_m)
-    return bool(rods) and not rest and all(rod.closed for rod in rods)
-
-
 def rods_of(part: Part, spacing_m: float = 0.01) -> tuple[list[Rod], list[Part]]:
     """A part split at its branches into rods, with a section every `spacing_m`, and what is none.
 
