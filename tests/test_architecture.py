@@ -17,7 +17,7 @@ MOST_PUBLIC_NAMES = 30
 
 LAYERS = (
     *("errors", "geometry", "io", "viz", "bundled", "shapes", "field", "training", "scans"),
-    *("regions", "surface", "toolpath", "process", "reports", "export"),
+    *("regions", "surface", "toolpath", "process_model", "process", "reports", "export"),
     *("robot.model", "robot.planning", "robot.simulation", "robot.report"),
     *("studio", "nrdf", "commands", "cli"),
 )

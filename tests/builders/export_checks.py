@@ -50,7 +50,7 @@ def compare(job, paths: list[list[Read]], force=False, dwell=True, turn=None, wi
             assert read.kind == segment.kind
             assert (read.feed_m_s is None) == (i == 0)
             if read.feed_m_s is not None:
-                assert read.feed_m_s == pytest.approx(segment.feed_m_s, rel=1e-3)
+                assert read.feed_m_s == pytest.approx(segment.speeds_m_s[n], rel=1e-3)
             if force:
                 assert read.force_n == segment.force_n
             last = n == len(segment.positions) - 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -10,7 +12,8 @@ from nrdf.toolpath.types import Job, Segment, ToolPath
 
 
 def wild_job(seed: int = 0) -> Job:
-    """Two paths of two tools with random orientations, gimbal lock and half turns among them."""
+    """Two paths of two tools with random orientations, gimbal lock and half turns among them, and a
+    segment with a feed for each waypoint."""
     rng = np.random.default_rng(seed)
 
     def segment(kind, line, count, force=None, dwell=0.0):
@@ -32,6 +35,8 @@ def wild_job(seed: int = 0) -> Job:
         segment("retract", 1, 1),
     )
     second = (segment("process", 3, 9, dwell=1.5),)
+    own = replace(first[4], feeds_m_s=np.round(rng.uniform(0.01, 0.4, 25), 4))
+    first = (*first[:4], own, *first[5:])
     return Job(
         "chair",
         "cell A",

@@ -24,10 +24,11 @@ def test_json(wild, tmp_path):
     for path in content["paths"]:
         reads = []
         for segment in path["segments"]:
-            for pose in segment["waypoints"]:
+            feeds = segment.get("feeds_m_s") or [segment["feed_m_s"]] * len(segment["waypoints"])
+            for pose, feed in zip(segment["waypoints"], feeds, strict=True):
                 turn = Rotation.from_quat(pose[3:]).as_matrix()
                 known = segment["kind"], np.array(pose[:3]), turn
-                reads.append(Read(*known, segment["feed_m_s"], segment["force_n"]))
+                reads.append(Read(*known, feed, segment["force_n"]))
             reads[-1].dwell_s = segment["dwell_s"]
         paths.append(reads)
     compare(wild, with_first_feed_unknown(paths), force=True)

@@ -29,7 +29,7 @@ def test_noether_has_a_tool_path_for_each_line_and_a_segment_for_each_contact(
     segments = [segment for lines in of_paths for line in lines for segment in line]
     assert [len(segment) for segment in segments] == [30, 27, 8, 9]
     kinds = iter([s.kind for p in wild.paths for s in p.segments for _ in s.positions])
-    feeds = iter([s.feed_m_s for p in wild.paths for s in p.segments for _ in s.positions])
+    feeds = iter([feed for p in wild.paths for s in p.segments for feed in s.speeds_m_s])
     reads = []
     for pose in (pose for segment in segments for pose in segment):
         assert set(pose) == {"x", "y", "z", "qx", "qy", "qz", "qw"}

@@ -43,11 +43,12 @@ def test_ros2_bag(wild, tmp_path):
                 seconds = np.array([stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps])
                 assert seconds[0] == pytest.approx(1e-9 * time, abs=2e-9)
                 ways = np.linalg.norm(np.diff(segment.positions, axis=0), axis=1)
-                np.testing.assert_allclose(np.diff(seconds) * segment.feed_m_s, ways, atol=1e-8)
-            for p in poses:
+                feeds = segment.speeds_m_s[1:]
+                np.testing.assert_allclose(np.diff(seconds) * feeds, ways, atol=1e-8)
+            for p, feed in zip(poses, segment.speeds_m_s, strict=True):
                 q = [getattr(p.orientation, key) for key in "xyzw"]
                 at = np.array([getattr(p.position, key) for key in "xyz"])
-                read = Read(kind, at, Rotation.from_quat(q).as_matrix(), segment.feed_m_s)
+                read = Read(kind, at, Rotation.from_quat(q).as_matrix(), feed)
                 reads.setdefault(topic.split("/")[2], []).append(read)
         compare(wild, with_first_feed_unknown(list(reads.values())), dwell=False)
 

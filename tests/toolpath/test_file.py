@@ -23,7 +23,8 @@ def random_segment(rng, kind="process", count=7):
     quaternions = rng.normal(size=(count, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
     force = 12.5 if kind == "process" else None
-    return Segment(kind, 1, rng.normal(size=(count, 3)), quaternions, 0.05, force, 0.25)
+    feeds = rng.uniform(0.01, 0.3, count) if kind == "process" else None
+    return Segment(kind, 1, rng.normal(size=(count, 3)), quaternions, 0.05, force, 0.25, feeds)
 
 
 def random_job():
@@ -126,7 +127,10 @@ def segment_with(**changes):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda c: c.update(version=5), "version 5; this nrdf reads versions up to 4: update nrdf"),
+        (
+            lambda c: c.update(version=5),
+            "version 5; this nrdf reads versions up to {VERSION}: update nrdf",
+        ),
         (lambda c: c.pop("version"), "version: is missing"),
         (lambda c: c.update(speed=1), "unknown key 'speed'"),
         (lambda c: c.update(frame="a\nb"), r"frame: a name with line breaks.*'a\\nb'"),
@@ -154,6 +158,8 @@ def segment_with(**changes):
         (lambda c: c["paths"][0]["strategy"].pop("passes"), "strategy.passes: is missing"),
         (lambda c: c["pose"].pop("up"), "pose.up: is missing"),
         (segment_with(positions_m=[[0, 0, 0]]), "has 1 positions_m, but 7 quaternions_xyzw"),
+        (segment_with(feeds_m_s=[0.1] * 6), "has 7 positions_m, but 6 feeds_m_s"),
+        (segment_with(feeds_m_s=[0.1, 0.0]), r"feeds_m_s\[1\]: must be above 0"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_named_by_field(tmp_path, change, message):

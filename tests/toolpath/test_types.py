@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nrdf.geometry.similarity import Similarity
@@ -23,6 +25,15 @@ def test_axes_are_tool_z():
     turned = np.array([[half, 0.0, 0.0, half], [0.0, 0.0, 0.0, 1.0]])  # about x, and not at all
     made = Segment("process", 0, np.zeros((2, 3)), turned, 0.1)
     np.testing.assert_allclose(made.axes, [[0, -1, 0], [0, 0, 1]], atol=1e-12)
+
+
+def test_a_segment_is_driven_at_one_feed_or_at_one_for_each_waypoint():
+    line = segment("process")
+    step = np.sqrt(27.0)
+    assert line.speeds_m_s.tolist() == [0.1] * 3
+    np.testing.assert_allclose(line.seconds, 2 * step / 0.1)
+    own = replace(line, feeds_m_s=np.array([9.0, 0.2, 0.4]))
+    np.testing.assert_allclose(own.seconds, step / 0.2 + step / 0.4)
 
 
 def test_groups_are_process_segments_with_the_moves_beside_them():

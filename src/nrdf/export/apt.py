@@ -54,12 +54,14 @@ def _path(path: ToolPath) -> list[str]:
     for index, blended in enumerate(blended_segments(path, 0.0), start=1):
         segment = blended.segment
         lines += commented([segment_title(segment, index).upper()], "PPRINT/", width=_WIDTH)
-        gotos = _gotos(segment)
-        if arriving and gotos:
-            lines += ["RAPID", *gotos.pop(0)]
+        set_to = ""
+        for goto, feed in zip(_gotos(segment), segment.speeds_m_s, strict=True):
+            if arriving:
+                lines.append("RAPID")
+            elif set_to != (set_to := number(60000 * feed, 3)):
+                lines.append(f"FEDRAT/{set_to},MMPM")
+            lines += goto
             arriving = False
-        lines.append(f"FEDRAT/{number(60000 * segment.feed_m_s, 3)},MMPM")
-        lines += [line for goto in gotos for line in goto]
         if segment.dwell_s:
             lines.append(f"DELAY/{number(segment.dwell_s, 3)}")
     return [*lines, "SPINDL/OFF"] if path.spindle_rad_s is not None else lines

@@ -38,9 +38,9 @@ def write(job: Job, options: Options, folder: Path) -> None:
         names = [spreadsheet_text(plain_text(text)) for text in texts]
         whole = [i, *names, float(path.tool_radius_m), path.spindle_rad_s]
         for k, segment in enumerate(path.segments, start=1):
-            about = [k, segment.kind, segment.line, segment.feed_m_s, segment.force_n]
+            about, feeds = [k, segment.kind, segment.line], segment.speeds_m_s.tolist()
             for n, position in enumerate(segment.positions, start=1):
                 dwell = segment.dwell_s if n == len(segment.positions) else 0.0
                 pose = [*position.tolist(), *segment.quaternions_xyzw[n - 1].tolist()]
-                writer.writerow([*whole, *about, dwell, *pose])
+                writer.writerow([*whole, *about, feeds[n - 1], segment.force_n, dwell, *pose])
     save(folder / f"{name}.csv", [*lines, *table.getvalue().splitlines()])

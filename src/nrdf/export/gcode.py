@@ -90,14 +90,14 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     row = 0
     for index, segment in enumerate(segments, start=1):
         lines += _comments([segment_title(segment, index)])
-        feed = f" F{number(60000 * segment.feed_m_s, 2)}"
-        for _ in range(len(segment.positions)):
+        set_to = ""
+        for speed in segment.speeds_m_s:
             point, angles = words[row]
             if row == 0:
                 lines.append(f"G0 {point} {angles}")
             else:
-                lines.append(f"G1 {point} {angles}{feed}")
-                feed = ""
+                same = set_to == (set_to := number(60000 * speed, 2))
+                lines.append(f"G1 {point} {angles}" + ("" if same else f" F{set_to}"))
             row += 1
         if segment.dwell_s:
             lines.append(f"G4 X{number(segment.dwell_s, 3)}")

@@ -44,12 +44,14 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
     for path in job.paths:
         segments = []
         for segment in path.segments:
+            feeds = segment.feeds_m_s
             poses = zip(segment.positions, segment.quaternions_xyzw, strict=True)
             segments.append(
                 {
                     "kind": segment.kind,
                     "line": segment.line,
                     "feed_m_s": float(segment.feed_m_s),
+                    **({} if feeds is None else {"feeds_m_s": feeds.tolist()}),
                     "force_n": segment.force_n,
                     "dwell_s": segment.dwell_s,
                     "waypoints": [[*p.tolist(), *q.tolist()] for p, q in poses]

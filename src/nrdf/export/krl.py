@@ -67,8 +67,10 @@ def _path(path: ToolPath, options: Options) -> list[str]:
     for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
         segment = blended.segment
         lines += commented([segment_title(segment, i)], "; ")
-        lines.append(f"$VEL.CP={number(segment.feed_m_s, 6)}")
-        for frame, rounded in _frames(blended):
+        set_to = ""
+        for (frame, rounded), feed in zip(_frames(blended), segment.speeds_m_s, strict=True):
+            if set_to != (set_to := number(feed, 6)):
+                lines.append(f"$VEL.CP={set_to}")
             lines.append(f"{'PTP' if arriving else 'LIN'} {frame}{' C_DIS' if rounded else ''}")
             arriving = False
         if segment.dwell_s:

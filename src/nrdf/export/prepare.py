@@ -89,6 +89,7 @@ def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
         np.abs(quaternions[1:] + quaternions[:-1]).max(axis=1),
     )
     kept[1:] = moved | (turned > _SAME)
+    feeds = np.concatenate([segment.speeds_m_s for segment in path.segments])[kept]
     owner, positions, quaternions = owner[kept], positions[kept], quaternions[kept]
     step = np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1)
     blends = np.minimum(blend_m, 0.45 * np.minimum(step, np.append(step[1:], 0.0)))
@@ -100,7 +101,10 @@ def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
     made = []
     for i, segment in enumerate(path.segments):
         own = owner == i
-        segment = replace(segment, positions=positions[own], quaternions_xyzw=quaternions[own])
+        segment = replace(
+            segment, positions=positions[own], quaternions_xyzw=quaternions[own],
+            feeds_m_s=None if segment.feeds_m_s is None else feeds[own],
+        )  # fmt: skip
         made.append(BlendedSegment(segment, blends[own]))
     return made
 

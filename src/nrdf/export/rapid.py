@@ -48,14 +48,14 @@ def write(job: Job, options: Options, folder: Path) -> None:
         f"Must exist in the controller: wobjdata {frame}; tooldata {', '.join(tools.values())}. "
         "The configuration is left to the controller (ConfL off).",
     )
-    feeds = dict.fromkeys(s.feed_m_s for path in job.paths for s in path.segments)
-    speeds = {feed: f"nrdf_v{i}" for i, feed in enumerate(feeds, start=1)}
+    feeds = (feed for path in job.paths for s in path.segments for feed in s.speeds_m_s)
+    values = dict.fromkeys(number(1000 * feed, 4) for feed in feeds)
+    speeds = {value: f"nrdf_v{i}" for i, value in enumerate(values, start=1)}
     procedures = routine_names(job, _LONGEST)
     # A module and a routine in it must not have one name.
     lines = [f"MODULE mod_{name}", *commented(comments, "  ! ")]
-    for feed, speed in speeds.items():
-        value = f"[{number(1000 * feed, 4)},500,5000,1000]"
-        lines.append(f"  LOCAL CONST speeddata {speed}:={value};")
+    for value, speed in speeds.items():
+        lines.append(f"  LOCAL CONST speeddata {speed}:=[{value},500,5000,1000];")
     blend = number(options.blend_mm, 3)
     zone = f"[FALSE,{blend},{blend},{blend},1,{blend},1]"
     lines += [f"  LOCAL CONST zonedata nrdf_zone:={zone};", "", f"  PROC {name}()"]
@@ -68,15 +68,15 @@ def write(job: Job, options: Options, folder: Path) -> None:
     save(folder / f"{name}.mod", [*lines, "ENDMODULE"], "\r\n")
 
 
-def _path(path: ToolPath, options: Options, speeds: dict[float, str], how: str) -> list[str]:
+def _path(path: ToolPath, options: Options, speeds: dict[str, str], how: str) -> list[str]:
     lines: list[str] = []
     arriving = True
     for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
         segment = blended.segment
         lines += commented([segment_title(segment, i)], "! ")
-        for target, zone in _targets(blended):
+        for (target, zone), feed in zip(_targets(blended), segment.speeds_m_s, strict=True):
             move = "MoveJ" if arriving else "MoveL"
-            lines.append(f"{move} {target},{speeds[segment.feed_m_s]},{zone},{how};")
+            lines.append(f"{move} {target},{speeds[number(1000 * feed, 4)]},{zone},{how};")
             arriving = False
         if segment.dwell_s:
             lines.append(f"WaitTime {number(segment.dwell_s, 3)};")

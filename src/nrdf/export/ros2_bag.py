@@ -66,7 +66,7 @@ def _seconds(segment: Segment, last: np.ndarray | None) -> np.ndarray:
     """Time (n,) to each waypoint from the end `last` (3,) of what was driven before."""
     start = segment.positions[0] if last is None else last
     steps = np.diff(segment.positions, axis=0, prepend=start[None])
-    return np.cumsum(np.linalg.norm(steps, axis=1)) / segment.feed_m_s
+    return np.cumsum(np.linalg.norm(steps, axis=1) / segment.speeds_m_s)
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -132,13 +132,14 @@ def _moves(blended: BlendedSegment, acceleration_m_s2: float) -> list[tuple[str,
     """Pose and motion parameters of each waypoint."""
     if len(blended.segment.positions) == 0:
         return []
-    speed = f"a={number(acceleration_m_s2, 3)}, v={number(blended.segment.feed_m_s, 5)}"
+    acceleration = number(acceleration_m_s2, 3)
     rotations = rotation_vectors(blended.segment.quaternions_xyzw)
     made = []
-    for position, rotation, blend in zip(
-        blended.segment.positions, rotations, blended.blends_m, strict=True
-    ):
+    for position, rotation, feed, blend in zip(
+        blended.segment.positions, rotations, blended.segment.speeds_m_s, blended.blends_m,
+        strict=True,
+    ):  # fmt: skip
         values = ", ".join(numbers(position, 7) + numbers(rotation, 8))
-        how = f"{speed}, r={number(float(blend), 5)}"
+        how = f"a={acceleration}, v={number(feed, 5)}, r={number(float(blend), 5)}"
         made.append((f"pose_trans(nrdf_frame, p[{values}])", how))
     return made

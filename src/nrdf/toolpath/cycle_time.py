@@ -159,7 +159,7 @@ def _seconds(work: Segment, turn_rad_s: float) -> float:
     if len(work.positions) < 2:
         return 0.0
     turned = angles_between(work.axes[:-1], work.axes[1:]) / turn_rad_s
-    return float(np.maximum(step_lengths(work.positions) / work.feed_m_s, turned).sum())
+    return float(np.maximum(step_lengths(work.positions) / work.speeds_m_s[1:], turned).sum())
 
 
 def _free_seconds(group: SegmentGroup) -> float:

@@ -33,9 +33,10 @@ from nrdf.toolpath.strategy import (
 )
 from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
-VERSION = 4
+VERSION = 5
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
-strategy; since 4 that has the settings of modifiers."""
+strategy; since 4 that has the settings of modifiers;
+since 5 waypoints may have feeds of their own."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -154,6 +155,7 @@ class _SegmentContent(StrictModel):
     feed_m_s: _AboveZero
     force_n: _AtLeastZero | None = None
     dwell_s: _AtLeastZero = 0.0
+    feeds_m_s: list[_AboveZero] | None = None
 
     def made(self, where: str) -> Segment:
         if len(self.positions_m) != len(self.quaternions_xyzw):
@@ -161,9 +163,16 @@ class _SegmentContent(StrictModel):
                 f"{where} has {len(self.positions_m)} positions_m, but "
                 f"{len(self.quaternions_xyzw)} quaternions_xyzw; each position needs one"
             )
+        if self.feeds_m_s is not None and len(self.feeds_m_s) != len(self.positions_m):
+            raise ProcessError(
+                f"{where} has {len(self.positions_m)} positions_m, but {len(self.feeds_m_s)} "
+                "feeds_m_s; each position needs one, or leave them out"
+            )
         content = {name: getattr(self, name) for name in type(self).model_fields}
         positions = np.array(content.pop("positions_m"), dtype=np.float64)
         content["quaternions_xyzw"] = np.array(content["quaternions_xyzw"], dtype=np.float64)
+        if self.feeds_m_s is not None:
+            content["feeds_m_s"] = np.array(self.feeds_m_s, dtype=np.float64)
         return Segment(positions=positions, **content)
 
 

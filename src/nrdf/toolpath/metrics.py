@@ -207,7 +207,7 @@ def _driven(segments: Sequence[Segment], free_feed: float) -> tuple[float, float
             free = float(np.linalg.norm(segment.positions[0] - end))
             between, time = between + free, time + free / free_feed
         length = total_length(segment.positions)
-        time += length / segment.feed_m_s + segment.dwell_s
+        time += segment.seconds + segment.dwell_s
         if segment.kind == "process":
             process += length
         else:

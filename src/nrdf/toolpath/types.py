@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from nrdf.geometry.frames import z_axes
+from nrdf.geometry.polylines import step_lengths
 from nrdf.geometry.similarity import Similarity
 from nrdf.toolpath.strategy import Strategy
 
@@ -27,7 +28,7 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class Segment:
-    """One stretch of a tool path, driven at one speed.
+    """One stretch of a tool path.
 
     kind: "process" works on the surface; the others move freely: "approach" to a process segment,
         "retract" away from it, "transition" from one retract to the next approach.
@@ -36,7 +37,8 @@ class Segment:
     quaternions_xyzw: (n, 4) unit, rotation from the tool frame to the job's frame. Tool z points
         along the tool's axis *into* the part, tool x along the travel, tool y completes a
         right-handed frame.
-    feed_m_s: speed of the tool centre point.
+    feed_m_s: speed of the tool centre point. feeds_m_s: (n,) of the way to each waypoint, where it
+        is not one feed all along; `feed_m_s` is then their mean over the way.
     force_n: contact force along tool z, at least 0, or None where nothing is touched.
     dwell_s: pause at the segment's last waypoint.
     """
@@ -48,6 +50,19 @@ class Segment:
     feed_m_s: float
     force_n: float | None = None
     dwell_s: float = 0.0
+    feeds_m_s: np.ndarray | None = None
+
+    @property
+    def speeds_m_s(self) -> np.ndarray:
+        """Speed (n,) of the tool centre point on the way to each waypoint, m/s."""
+        if self.feeds_m_s is not None:
+            return self.feeds_m_s
+        return np.full(len(self.positions), self.feed_m_s)
+
+    @property
+    def seconds(self) -> float:
+        """Time on the way at these speeds, without the dwell."""
+        return float((step_lengths(self.positions) / self.speeds_m_s[1:]).sum())
 
     @cached_property
     def axes(self) -> np.ndarray:

@@ -263,7 +263,11 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
     into = np.array([*path.approach, path.joints[0]])
     out = np.array([path.joints[-1], *path.retract])
 
-    def action(kind: ActionKind, joints: np.ndarray, number: np.ndarray, feed: float) -> Action:
+    towards = path.first + np.ceil(path.waypoint[1:] - 1e-9).astype(int)
+
+    def action(
+        kind: ActionKind, joints: np.ndarray, number: np.ndarray, feed: float | np.ndarray
+    ) -> Action:
         tips = cell.chain.frames(joints).tcp
         seconds = step_lengths(tips) / feed
         timed = time_parameterize(cell.chain, joints, seconds)
@@ -280,6 +284,6 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
 
     return [
         action("approach", into, np.arange(float(len(into))), approach.feed_m_s),
-        action("process", path.dense, path.waypoint, process.feed_m_s),
+        action("process", path.dense, path.waypoint, process.speeds_m_s[towards]),
         action("retract", out, np.arange(float(len(out))), retract.feed_m_s),
     ]
