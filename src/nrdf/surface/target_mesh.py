@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import RLock
 from typing import Any
 
 import igl
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 from nrdf.errors import DataError, ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.mesh import Mesh, triangle_crosses
+from nrdf.geometry.winding import MeshWindingNumber
 from nrdf.surface.mesh_edges import opposite_half_edges
 from nrdf.surface.mesh_repair import repaired_skin
 
@@ -47,15 +49,11 @@ class TargetMesh:
     faces: np.ndarray
     repairs: tuple[str, ...] = ()
     _found: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _lock: Any = field(default_factory=RLock, repr=False)  # each search tree is built by one thread
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: search trees stay here, and are built anew there."""
-        return {
-            "vertices": self.vertices,
-            "faces": self.faces,
-            "repairs": self.repairs,
-            "_found": {},
-        }
+        return TargetMesh, (self.vertices, self.faces, self.repairs)
 
     @staticmethod
     def from_mesh(mesh: Mesh) -> TargetMesh:
@@ -138,18 +136,29 @@ class TargetMesh:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Squared distances (m,), faces (m,) and places (m, 3) on the faces that look to one of
         `_SIDES`, or on all for -1."""
-        if side not in self._found:
-            chosen = np.arange(len(self.faces))
-            if side >= 0:
-                facing = self.face_normals @ _SIDES[side] > _FACING
-                chosen = np.flatnonzero(facing) if facing.any() else chosen
-            faces = np.ascontiguousarray(self.faces[chosen])
-            tree = igl.AABB()
-            tree.init(self.vertices, faces)
-            self._found[side] = (tree, chosen, faces)
+        with self._lock:
+            if side not in self._found:
+                self._found[side] = self._tree_of_side(side)
         tree, chosen, faces = self._found[side]
         squared, face, places = tree.squared_distance(self.vertices, faces, points)
         return np.array(squared), chosen[np.asarray(face)], np.array(places)
+
+    def _tree_of_side(self, side: int) -> tuple[igl.AABB, np.ndarray, np.ndarray]:
+        chosen = np.arange(len(self.faces))
+        if side >= 0:
+            facing = self.face_normals @ _SIDES[side] > _FACING
+            chosen = np.flatnonzero(facing) if facing.any() else chosen
+        faces = np.ascontiguousarray(self.faces[chosen])
+        tree = igl.AABB()
+        tree.init(self.vertices, faces)
+        return tree, chosen, faces
+
+    def winding_numbers(self, points: np.ndarray) -> np.ndarray:
+        """Winding numbers (m,) at points (m, 3), m: about 1 inside the object, 0 outside."""
+        with self._lock:
+            if "winding" not in self._found:
+                self._found["winding"] = MeshWindingNumber(self.vertices, self.faces)
+        return np.asarray(self._found["winding"](points))
 
     def first_hits(
         self, starts: np.ndarray, directions: np.ndarray

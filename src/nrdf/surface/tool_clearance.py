@@ -9,7 +9,6 @@ import numpy as np
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.units import readable
-from nrdf.geometry.winding import mesh_winding_numbers
 from nrdf.surface.fine_mesh import FineMesh, edges_of, refine
 from nrdf.surface.mesh_cut import bisected, divided
 from nrdf.surface.region_mesh import RegionMesh
@@ -40,8 +39,7 @@ def has_clearance(
     leaving = np.einsum("ma,ma->m", mesh.face_normals[faces], normals) > 0.0
     unsure = np.flatnonzero(free & (faces >= 0) & leaving)
     if len(unsure):
-        wound = mesh_winding_numbers(mesh.vertices, mesh.faces, starts[unsure])
-        free[unsure[wound > _INSIDE]] = False
+        free[unsure[mesh.winding_numbers(starts[unsure]) > _INSIDE]] = False
     return np.asarray(free)
 
 
