@@ -85,6 +85,7 @@ def write_job_files(
         write_knowledge(folder / KNOWLEDGE, _knowledge(result, folder, origin))
     start = time.perf_counter()
     panel = panel_of(result, title)
+    assert panel.scene is not None  # made ready before two threads ask for it
     with ThreadPoolExecutor(2) as pool:
         whole = pool.submit(draw_regions, [panel], folder / PICTURE, _WHOLE)
         details = pool.submit(render_details, panel, panel.names, _DETAIL).result()

@@ -93,7 +93,7 @@ class MeshScene:
             own = tuple(np.asarray(line, np.float64) for line in own if len(line))
             if own:
                 below = surfaces.get(number, surfaces[-1])
-                drawn.append(PathLines(number, own, tuple(_normals(*below, line) for line in own)))
+                drawn.append(PathLines(number, own, _normals(*below, own)))
         region = np.repeat([number for number, *_ in parts], [len(faces) for *_, faces in parts])
         return MeshScene(
             np.concatenate(corners), np.nan_to_num(np.concatenate(normals)), region, edges,
@@ -146,7 +146,7 @@ class MeshScene:
         number, the last for none; line_colours: the same for lines.
         """
         shape, pixels = (OVERSAMPLING * shape[0], OVERSAMPLING * shape[1]), OVERSAMPLING * pixels
-        view = self.corners @ axes.T
+        view = (self.corners.reshape(-1, 3) @ axes.T).reshape(-1, 3, 3)
         view[..., :2] = (view[..., :2] - corner) * pixels
         layer = _LAYER * (self.face_region + 1.0)
         face, depth = _rasterised(view, layer, shape)
@@ -198,52 +198,47 @@ def _rasterised(
     view: (f, 3, 3), x and y in pixels, z towards the viewer; layer: (f,), added to the depth of
     faces that look this way where two meet.
     """
-    a, b, c = view[:, 0], view[:, 1], view[:, 2]
-    twice = _cross((b - a)[:, :2], (c - a)[:, :2])
-    low = np.ceil(np.maximum(view[..., 1].min(axis=1) - 0.5, 0.0)).astype(np.int64)
-    high = np.floor(np.minimum(view[..., 1].max(axis=1) - 0.5, shape[0] - 1.0)).astype(np.int64)
-    out = (view[..., 0].max(axis=1) < 0.0) | (view[..., 0].min(axis=1) > shape[1])
-    rows = np.where((np.abs(twice) > 1e-9) & ~out, np.maximum(high - low + 1, 0), 0)
-    face, row = counted(rows, low)
-    # Along a row, a triangle reaches from one of its edges to another.
-    left, right = np.full(len(face), np.inf), np.full(len(face), -np.inf)
-    y = row + 0.5
-    for one, other in ((a, b), (b, c), (c, a)):
-        (x1, y1), (x2, y2) = one[face, :2].T, other[face, :2].T
-        rise = np.where(y2 == y1, 1.0, y2 - y1)
-        x = x1 + (y - y1) / rise * (x2 - x1)
-        crosses = (np.minimum(y1, y2) <= y) & (y <= np.maximum(y1, y2)) & (y2 != y1)
-        left = np.where(crosses, np.minimum(left, x), left)
-        right = np.where(crosses, np.maximum(right, x), right)
-    left = np.where(np.isfinite(left), left, 1.0)
-    first = np.ceil(np.clip(left - 0.5, 0.0, shape[1])).astype(np.int64)
-    last = np.floor(np.clip(right - 0.5, -1.0, shape[1] - 1.0)).astype(np.int64)
+    # A row of its own for each coordinate of each corner: what follows is bound by memory.
+    x, y, z = np.ascontiguousarray(view.transpose(2, 1, 0))
+    low = np.ceil(np.maximum(y.min(axis=0) - 0.5, 0.0)).astype(np.int64)
+    high = np.floor(np.minimum(y.max(axis=0) - 0.5, shape[0] - 1.0)).astype(np.int64)
+    twice = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+    within = (x.max(axis=0) >= 0.0) & (x.min(axis=0) <= shape[1])
+    drawn = np.flatnonzero(within & (high >= low) & (np.abs(twice) > 1e-9))
+    x, y, z = (np.ascontiguousarray(one[:, drawn]) for one in (x, y, z))
+    twice, low = twice[drawn], low[drawn]
+    face, row = counted(high[drawn] - low + 1, low)
+    # Along a row, a triangle reaches from its longest edge upwards to one of the two others.
+    order = y.argsort(axis=0)
+    (xa, xb, xc), (ya, yb, yc) = (np.take_along_axis(one, order, axis=0) for one in (x, y))
+    height = row + 0.5
+    one = xa[face] + (height - ya[face]) * _ratio(xc - xa, yc - ya)[face]
+    below = height < yb[face]
+    slope = np.where(below, _ratio(xb - xa, yb - ya)[face], _ratio(xc - xb, yc - yb)[face])
+    other = xb[face] + (height - yb[face]) * slope
+    first = np.ceil(np.clip(np.minimum(one, other) - 0.5, 0.0, shape[1])).astype(np.int64)
+    last = np.floor(np.clip(np.maximum(one, other) - 0.5, -1.0, shape[1] - 1.0)).astype(np.int64)
+    # Depth as a function of the pixel, within what the triangle has: it may be seen edge-on.
+    depth_x = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / twice
+    depth_y = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / twice
+    start = z[0] + depth_x * (0.5 - x[0]) - depth_y * y[0]
+    start, slope = start[face] + depth_y[face] * height, depth_x[face]
+    nearest, farthest = z.max(axis=0)[face], z.min(axis=0)[face]
+    lifted = np.where(twice > 0.0, layer[drawn] + _LAYER, 0.0).astype(np.float32)[face]
     span, column = counted(np.maximum(last - first + 1, 0), first)
-    face, row = face[span], row[span]
-    depth_x, depth_y = _slopes(a, b, c, twice)
-    z = a[face, 2] + depth_x[face] * (column + 0.5 - a[face, 0])
-    z += depth_y[face] * (row + 0.5 - a[face, 1])
-    z = np.clip(z, view[..., 2].min(axis=1)[face], view[..., 2].max(axis=1)[face])
-    z = z.astype(np.float32)
-    z += np.where(twice > 0.0, layer + _LAYER, 0.0).astype(np.float32)[face]
-    pixel = row * shape[1] + column
+    at = np.clip(start[span] + slope[span] * column, farthest[span], nearest[span])
+    at = at.astype(np.float32) + lifted[span]
+    pixel = (row * shape[1])[span] + column
     depth = np.full(shape[0] * shape[1], -np.inf, np.float32)
-    np.maximum.at(depth, pixel, z)
+    np.maximum.at(depth, pixel, at)
     owner = np.full(shape[0] * shape[1], -1)
-    wins = z == depth[pixel]
-    owner[pixel[wins]] = face[wins]
+    wins = at == depth[pixel]
+    owner[pixel[wins]] = drawn[face[span[wins]]]
     return owner.reshape(shape), np.maximum(depth, np.float32(-10.0)).reshape(shape)
 
 
-def _slopes(
-    a: np.ndarray, b: np.ndarray, c: np.ndarray, twice: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How depth changes with x and y (f,) on triangles; within what they have, seen edge-on."""
-    u, v = b - a, c - a
-    whole = np.where(np.abs(twice) > 1e-9, twice, 1.0)
-    x = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) / whole
-    y = (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) / whole
-    return x, y
+def _ratio(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.asarray(one / np.where(other == 0.0, 1.0, other))
 
 
 def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -263,7 +258,11 @@ def _sharp_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray(igl.sharp_edges(vertices, faces, float(_SHARP_RAD))).reshape(-1, 2)
 
 
-def _normals(vertices: np.ndarray, faces: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Outward normals (k, 3) of the triangles nearest to places (k, 3)."""
+def _normals(
+    vertices: np.ndarray, faces: np.ndarray, lines: Sequence[np.ndarray]
+) -> tuple[np.ndarray, ...]:
+    """Outward normals (k, 3) of the triangles nearest to the points of lines (k, 3)."""
+    places = np.concatenate(lines)
     _, face, _ = igl.point_mesh_squared_distance(places, vertices, faces)
-    return unit_vectors(triangle_crosses(vertices, faces[face]))
+    normals = unit_vectors(triangle_crosses(vertices, faces[face]))
+    return tuple(np.split(normals, np.cumsum([len(line) for line in lines[:-1]])))

@@ -14,6 +14,7 @@ import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,6 +91,11 @@ class Panel:
         """All regions that it shows."""
         return list(dict.fromkeys((*self.regions, *self.region_meshes, *self.lines)))
 
+    @cached_property
+    def scene(self) -> Scene | MeshScene:
+        """What of it is drawn, made ready once for all its pictures."""
+        return _prepare(self, self.names)
+
 
 def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> None:
     """Write a picture of `panels` side by side, one colour a region; `path`'s ending is its format.
@@ -113,7 +119,7 @@ def render_panels(
     """
     names = list(dict.fromkeys(name for panel in panels for name in panel.names))
     colours = region_colours(names)
-    drawn = [_prepare(panel, names) for panel in panels]
+    drawn = [p.scene if p.names == names else _prepare(p, names) for p in panels]
     hidden = _hidden_regions(drawn, len(names))
     cameras = [FRONT, _best_side(drawn, hidden)] if hidden else [FRONT]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
@@ -126,7 +132,7 @@ def render_details(panel: Panel, names: Sequence[str], size: int) -> dict[str, n
     and with its own lines."""
     every = panel.names
     table, pale = _fills(region_colours(every))
-    scene = _prepare(panel, every)
+    scene = panel.scene
 
     def draw(name: str) -> np.ndarray:
         own = scene.region == every.index(name)
