@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import nrdf
 from builders.scaled_box import SCALE, UP, scaled_reference
 from builders.taught_box import SIZE, cloud, faces
+from nrdf.geometry.similarity import Similarity
 from nrdf.process.correspondence import Correspondence
 
 
@@ -49,3 +53,19 @@ def test_a_direction_follows_the_surface(correspondence):
         assert np.linalg.norm(there) == pytest.approx(1.0)
     spot = faces(cloud())["top"][:1]
     np.testing.assert_allclose(correspondence.map_direction(spot, 3 * UP), UP)
+
+
+def test_what_is_fixed_moves_with_the_whole_object_only(model):
+    reference = scaled_reference(model, cloud(), SCALE)
+    turned = Rotation.from_rotvec([0.0, 0.7, 0.3])
+    pose = Similarity(turned.as_matrix(), np.array([1.0, 2.0, 3.0]), 1.0)
+    own = model.encode(cloud(SIZE * SCALE, seed=1))
+    there = replace(own, pose=own.pose.then(pose))
+    correspondence = Correspondence(reference, there)
+    given = np.array([1.0, 0.0, 1.0])
+    expected = turned.apply(given) / np.sqrt(2.0)
+    np.testing.assert_allclose(correspondence.turn_direction(given), expected, atol=1e-9)
+    centre = correspondence.move_point(np.zeros(3))
+    np.testing.assert_allclose(centre, pose.translation, atol=0.01)
+    moved = correspondence.move_point(given) - centre
+    np.testing.assert_allclose(moved, correspondence.scale * turned.apply(given), atol=1e-9)

@@ -40,6 +40,7 @@ def test_settings_of_modifiers_are_handed_on():
         "start": "far-left", "run_off_mm": 40, "run_off_height_mm": 10, "lead_in_radius_mm": 20,
         "lead_out_radius_mm": 30, "offset_mm": -1, "drag_mm": 5, "edge_contact_mm": 25,
         "lead_deg": 5, "largest_turn_deg_mm": 2, "chord_error_mm": 0.1, "minimum_length_mm": 12,
+        "origin_mm": [100, 0, -200], "resample_step_mm": 60, "resample_turn_deg": 10,
         "join_gap_mm": 8, "heading": "fixed", "constant_speed": True, "direction_mode": "fixed",
     }  # fmt: skip
     made = strategy_of(process(**given))
@@ -49,6 +50,8 @@ def test_settings_of_modifiers_are_handed_on():
     assert (made.offset_m, made.drag_m, made.edge_contact_m) == (-0.001, 0.005, 0.025)
     assert (made.chord_error_m, made.least_line_m, made.joined_gap_m) == (0.0001, 0.012, 0.008)
     assert made.constant_speed
+    assert made.origin_m.tolist() == [0.1, 0.0, -0.2] and made.resample_step_m == 0.06
+    assert np.isclose(made.resample_turn_rad, np.radians(10.0))
     assert np.isclose(made.largest_turn_rad_m, np.radians(2.0) * 1e3)
     assert np.isclose(strategy_of(process()).largest_turn_rad_m, np.radians(3.0) * 1e3)
 

@@ -148,3 +148,43 @@ def test_the_contact_keeps_the_feed_where_asked():
 
 def test_every_modifier_has_a_name():
     assert {"run-off", "join", "edge-contact", "approach-retract", "offset"} < set(MODIFIERS)
+
+
+@pytest.mark.parametrize("trajectory", ["contour", "edge"])
+def test_rings_are_driven_from_the_outside_in_or_from_the_inside_out(trajectory):
+    region = plate_with_hole()
+    made = {}
+    for start in ("outside", "inside"):
+        lines = planned(region, trajectory=trajectory, start=start, line_order="snake")
+        # Distance from the nearest border: of the plate, or of its hole of 50 mm.
+        places = [line.positions for line in lines]
+        outer = [np.minimum(0.2 - np.abs(p[:, 0]), 0.15 - np.abs(p[:, 1])) for p in places]
+        hole = [np.linalg.norm(p, axis=1) - 0.05 for p in places]
+        depth = [np.minimum(o, h).mean() for o, h in zip(outer, hole, strict=True)]
+        made[start] = depth if trajectory == "contour" else [o.mean() for o in outer]
+    assert len(made["outside"]) >= 2
+    assert (np.diff(made["outside"]) > -3e-3).all()
+    assert (np.diff(made["inside"]) < 3e-3).all()
+
+
+def test_the_nearest_next_is_driven_next():
+    lines = planned(plate_with_hole(), line_order="nearest", direction=np.array([0.0, 1.0, 0.0]))
+    ends = [line.positions[[0, -1]] for line in lines]
+    for k, (_, stop) in enumerate(ends[:-1]):
+        away = [np.linalg.norm(end - stop, axis=1).min() for end in ends[k + 1 :]]
+        assert np.linalg.norm(ends[k + 1][0] - stop) == pytest.approx(min(away))
+
+
+def test_fewer_waypoints_stay_within_the_chord_error_and_the_turn():
+    given = {"direction_mode": "across", "spacing_m": 0.001, "chord_error_m": 1e-4}
+    dense, thin = planned(tube(), **given), planned(tube(), **given, resample_step_m=0.08)
+    assert len(thin) == len(dense)
+    assert sum(len(s.positions) for s in thin) < 0.7 * sum(len(s.positions) for s in dense)
+    for one, other in zip(dense, thin, strict=True):
+        assert step_lengths(other.positions).max() <= 0.08
+        assert turns(other.axes).max() <= np.radians(5.0) + 1e-9
+        for place in one.positions:
+            start, ahead = other.positions[:-1], np.diff(other.positions, axis=0)
+            share = ((place - start) * ahead).sum(axis=1) / (ahead**2).sum(axis=1)
+            on = start + np.clip(share, 0.0, 1.0)[:, None] * ahead
+            assert np.linalg.norm(on - place, axis=1).min() <= 1e-4 + 1e-9

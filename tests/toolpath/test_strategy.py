@@ -54,3 +54,10 @@ def test_every_name_that_is_not_known_is_told_with_those_that_are():
     for field in ("start", "line_order", "heading", "direction_mode"):
         with pytest.raises(ProcessError, match=field.replace("_", " ")):
             Strategy(**{field: "sideways"})
+
+
+def test_an_origin_is_three_numbers():
+    assert Strategy(origin_m=(0.0, 0.0, 0.0)).origin_m == (0.0, 0.0, 0.0)
+    for wrong in ((0.0, 1.0), (np.nan, 0.0, 0.0), (0.0, 1e9, 0.0)):
+        with pytest.raises(ProcessError, match=r"origin_m is .*give 3 numbers, in metres"):
+            Strategy(origin_m=wrong)

@@ -14,7 +14,7 @@ from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
 from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.strategy import strategy_of
-from nrdf.process.taught_paths import normals_under, taught_segments
+from nrdf.process.taught_paths import check_origin, normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -83,6 +83,7 @@ def check_process(
         strategy = strategy_of(process)
         if process.waypoints is None:
             _check_spacing(region, process)
+            check_origin(process, region.parent)
             segments = plan_on_mesh(region, strategy)
         else:
             taught = taught_segments(process, region.parent)

@@ -153,13 +153,25 @@ class Correspondence:
         spread = here.T @ here
         size = float(np.trace(spread))
         if len(here) < 3 or size == 0.0:  # a spot has no orientation
-            canonical = encoded.encoded_cloud.canonical_normals(np.asarray(direction, float))
-            return unit_vectors(self.target.original_normals(canonical))
+            return self.turn_direction(direction)
         turn, _ = Rotation.align_vectors(there, here)
         similar = np.sqrt((there**2).sum() / size) * turn.as_matrix()
         ridge = 0.05 * size / 3.0 * np.eye(3)
         affine = np.linalg.solve(spread + ridge, here.T @ there + ridge @ similar.T).T
         return unit_vectors(affine @ unit_vectors(np.asarray(direction, float)))
+
+    def turn_direction(self, direction: np.ndarray) -> np.ndarray:
+        """A direction (3,) of the reference's frame, turned with the whole object only."""
+        canonical = self.reference.encoded.encoded_cloud.canonical_normals(
+            np.asarray(direction, float)
+        )
+        return unit_vectors(self.target.original_normals(canonical))
+
+    def move_point(self, point: np.ndarray) -> np.ndarray:
+        """A point (3,), m, of the reference's frame, moved, turned and scaled with the whole object
+        only."""
+        canonical = self.reference.encoded.encoded_cloud.canonical(np.asarray(point, float)[None])
+        return self.target.original(canonical)[0]
 
 
 def surface_of(encoded: EncodedCloud) -> Surface:

@@ -37,7 +37,8 @@ def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
             f"lines are up to {readable('spacing_m', worst)} apart; "
             f"{readable('stepover_m', stepover)} were asked for"
         )
-    if process.trajectory != "taught" and metrics.step_worst_m > _LARGEST_STEP * process.spacing_m:
+    allowed = max(_LARGEST_STEP * process.spacing_m, process.resample_step_m)
+    if process.trajectory != "taught" and metrics.step_worst_m > allowed:
         step, requested = (readable("_m", x) for x in (metrics.step_worst_m, process.spacing_m))
         lines.append(f"a step of {step} between neighbouring waypoints; {requested} were asked for")
     if metrics.turn_worst_rad > _LARGEST_TURN_RAD:

@@ -32,11 +32,18 @@ Kind = Literal["sand", "polish", "oil", "paint", "clean", "inspect", "custom"]
 Trajectory = Literal[
     "raster", "plane-slices", "cross-hatch", "contour", "spiral", "edge", "rod", "taught"
 ]
+OriginMode = Literal["taught", "fixed"]
 TransferMode = Literal["replan", "warp"]
 WITHOUT_CONTACT = ("paint", "inspect")
 """Kinds of process that touch nothing, so have no contact force."""
 
 
+_CORNERS = ("near-left", "near-right", "far-left", "far-right")
+_RINGS = ("outside", "inside")
+_STARTS: dict[str, tuple[str, ...]] = {
+    "contour": _RINGS, "spiral": _RINGS, "edge": (*_CORNERS, *_RINGS),
+}  # fmt: skip
+_WITH_ORIGIN = ("raster", "plane-slices", "cross-hatch")
 _FEED, _LENGTH = PlausibleRange(1e-4, 5.0), PlausibleRange(0.0, 1.0)
 _SPACING = PlausibleRange(1e-4, 1.0)
 _TILT = PlausibleRange(-math.pi / 3, math.pi / 3)
@@ -110,9 +117,16 @@ class Process(Quantities):
     """taught: the direction, moved with the region to the new object; fixed: turned with the whole
     object only; principal: the region's longest way; across: square to that, or to the direction.
     Unless given, taught where there is a direction, else principal."""
+    origin_m: Vector | None = None
+    """A place, in the reference's frame, that a line of the raster passes through; the others lie
+    at whole stepovers from it. Unless given, lines lie evenly between the region's borders."""
+    origin_mode: OriginMode | None = None
+    """taught: the origin, a point on the reference, moved with the region to the new object; fixed:
+    any point, moved with the whole object only. Unless given, taught."""
     start: Start | None = None
     """Where the first line begins, seen from outside with the lines' direction ahead: near-left,
-    near-right, far-left, far-right; of rings and spirals outside or inside."""
+    near-right, far-left, far-right. outside: rings, edges and spirals from the outside in; inside:
+    from the inside out, an outer border after its holes."""
     line_order: LineOrder | None = None
     """zigzag: back and forth, joined on the surface; snake: back and forth, lifted between lines;
     one-way: every line in the same direction; nearest: on to the nearest end. Unless given, snake
@@ -136,6 +150,13 @@ class Process(Quantities):
     chord_error_m: Annotated[NotNegative, PlausibleRange(0.0, 0.1)] = 0.0
     """How far the straight way between two waypoints may be off the surface; more waypoints where
     it would be farther. 0: evenly spaced waypoints."""
+    resample_step_m: Annotated[NotNegative, _LENGTH] = 0.0
+    """Longest step between waypoints where some are left out again: those between which the way is
+    straight within chord_error_m, and the tool turns by less than resample_turn_rad. 0: none is
+    left out."""
+    resample_turn_rad: Annotated[Positive | None, PlausibleRange(1e-3, math.pi / 6)] = None
+    """How far the tool may turn from one waypoint to the next where some are left out; unless
+    given, 5°."""
     minimum_length_m: Annotated[NotNegative | None, _LENGTH] = None
     """Shorter lines are left out where nothing is lost with them; unless given, the tool's
     radius."""
@@ -254,10 +275,22 @@ class Process(Quantities):
                 "direction_mode principal is the region's longest way; remove the direction, or "
                 "give direction_mode: taught"
             )
-        rings = self.trajectory in ("contour", "spiral")
-        if self.start is not None and (self.start in ("outside", "inside")) != rings:
-            names = "outside or inside" if rings else "near-left, near-right, far-left or far-right"
+        starts = _STARTS.get(self.trajectory, _CORNERS)
+        if self.start is not None and self.start not in starts:
+            names = f"{', '.join(starts[:-1])} or {starts[-1]}"
             raise ValueError(f"start of a {self.trajectory} is {names}, not {self.start}")
+        if self.origin_m is not None and self.trajectory not in _WITH_ORIGIN:
+            raise ValueError(
+                f"a {self.trajectory} has no origin_m; {', '.join(_WITH_ORIGIN[:-1])} and "
+                f"{_WITH_ORIGIN[-1]} have"
+            )
+        if self.origin_mode is not None and self.origin_m is None:
+            raise ValueError(f"origin_mode {self.origin_mode} needs origin_m")
+        if self.resample_step_m > 0.0 and self.chord_error_m == 0.0:
+            raise ValueError(
+                "resample_step_m needs chord_error_m: how far the way may be off without the "
+                "waypoints that are left out"
+            )
         if self.edge_contact_m > 0.0 and self.lead_rad == self.tilt_rad == 0.0:
             raise ValueError("edge_contact_m needs lead_rad or tilt_rad: an upright disc lies flat")
         if self.run_off_height_m > 0.0 and self.run_off_m == 0.0:

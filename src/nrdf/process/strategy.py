@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.process.process import Process
-from nrdf.toolpath.strategy import LARGEST_TURN_RAD_M, Strategy
+from nrdf.toolpath.strategy import LARGEST_TURN_RAD_M, RESAMPLE_TURN_RAD, Strategy
 from nrdf.toolpath.types import Segment, ToolPath
 
 
@@ -41,6 +41,7 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         retract_feed_m_s=process.retract.feed_m_s,
         direction_mode=process.direction_mode or "taught",
         start=process.start,
+        origin_m=None if process.origin_m is None else np.asarray(process.origin_m, float),
         line_order=process.order_of_lines,
         heading=process.heading,
         run_off_m=process.run_off_m,
@@ -52,6 +53,8 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         edge_contact_m=process.edge_contact_m,
         largest_turn_rad_m=process.largest_turn_rad_m or LARGEST_TURN_RAD_M,
         chord_error_m=process.chord_error_m,
+        resample_step_m=process.resample_step_m,
+        resample_turn_rad=process.resample_turn_rad or RESAMPLE_TURN_RAD,
         minimum_length_m=process.minimum_length_m,
         join_gap_m=process.join_gap_m,
         constant_speed=process.constant_speed,

@@ -16,6 +16,7 @@ from nrdf.process.correspondence import Correspondence
 from nrdf.process.process import Process, TaughtSegment
 from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.strategy import strategy_of, tool_path
+from nrdf.process.taught_paths import check_origin
 from nrdf.process.transfer_result import FoundRegion, PathResult
 from nrdf.process.warp import warp_segments
 from nrdf.surface.given_surface import GivenSurface
@@ -72,23 +73,50 @@ class TargetPaths:
         made = PathResult(region, number, process, process.transfer_mode)
         if found.missing or found.mesh is None:
             return replace(made, reason=found.missing)
-        if process.direction is not None:
-            indices = self.reference.bound_knowledge.regions[region]
-            given = np.array(process.direction)
-            direction = self.correspondence.map_direction(indices, given)
-            process = process.model_copy(update={"direction": tuple(direction.tolist())})
-        strategy = strategy_of(process)
         warnings: tuple[str, ...] = ()
         try:
+            process, warnings = self._placed(region, process)
+            strategy = strategy_of(process)
             if process.transfer_mode == "replan":
                 segments = plan_on_mesh(found.mesh, strategy)
             else:
-                process, segments, warnings = self._warp(region, number, process, found.mesh)
+                process, segments, lost = self._warp(region, number, process, found.mesh)
+                warnings += lost
             metrics = measure_path(found.mesh, strategy, segments, self.given, self.up)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)
         return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
+
+    def _placed(self, region: str, process: Process) -> tuple[Process, tuple[str, ...]]:
+        """A process with its direction and origin as they are on the target, and warnings."""
+        correspondence, changes = self.correspondence, dict[str, object]()
+        warnings: tuple[str, ...] = ()
+        if process.direction is not None:
+            given = np.array(process.direction)
+            if process.direction_mode == "fixed":
+                direction = correspondence.turn_direction(given)
+            else:
+                indices = self.reference.bound_knowledge.regions[region]
+                direction = correspondence.map_direction(indices, given)
+            changes["direction"] = tuple(direction.tolist())
+        if process.origin_m is not None:
+            origin = np.array(process.origin_m)
+            if process.origin_mode == "fixed":
+                changes["origin_m"] = tuple(correspondence.move_point(origin).tolist())
+            else:
+                mesh = self.reference.region(region).mesh
+                check_origin(process, mesh)
+                near = mesh.nearest(origin[None])
+                found, _, there = correspondence.map_points(near.points, near.normals)
+                changes["origin_m"] = tuple(found[0].tolist()) if there[0] else None
+                changes["origin_mode"] = process.origin_mode if there[0] else None
+                if not there[0]:
+                    warnings = (
+                        "origin_m has no place on the target; the lines lie evenly between the "
+                        "region's borders",
+                    )
+        return process.model_copy(update=changes), warnings
 
     def _warp(
         self, region: str, number: int, process: Process, mesh: RegionMesh

@@ -45,6 +45,20 @@ def taught_segments(process: Process, mesh: TargetMesh) -> tuple[Segment, ...]:
     return tuple(segments)
 
 
+def check_origin(process: Process, mesh: TargetMesh) -> None:
+    """Raise ProcessError for a taught origin that is not on the reference."""
+    if process.origin_m is None or process.origin_mode == "fixed":
+        return
+    away = float(mesh.nearest(np.array([process.origin_m])).distances[0])
+    allowed = ON_REFERENCE * mesh.size
+    if away > allowed:
+        raise ProcessError(
+            f"origin_m is {readable('away_m', away)} from the reference; at most "
+            f"{readable('allowed_m', allowed)} is allowed for a taught origin. Is it in the "
+            "reference's frame, in metres? With origin_mode: fixed it may lie anywhere"
+        )
+
+
 def _quaternions(
     line: TaughtSegment, positions: np.ndarray, process: Process, mesh: TargetMesh
 ) -> np.ndarray:

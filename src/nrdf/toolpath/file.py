@@ -24,6 +24,7 @@ from nrdf.io.files import read_file, require_file
 from nrdf.io.schema import Location, StrictModel, validation_messages
 from nrdf.toolpath.strategy import (
     LARGEST_TURN_RAD_M,
+    RESAMPLE_TURN_RAD,
     DirectionMode,
     Heading,
     LineOrder,
@@ -35,8 +36,8 @@ from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
 VERSION = 5
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
-strategy; since 4 that has the settings of modifiers;
-since 5 waypoints may have feeds of their own."""
+strategy; since 4 that has the settings of modifiers; since 5 waypoints may have feeds of their own,
+and a strategy has an origin and resampling."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -197,9 +198,10 @@ class _StrategyContent(StrictModel):
     retract_distance_m: float
     retract_angle_rad: float
     retract_feed_m_s: float
-    # Since version 4, so with the values that earlier paths were made with.
+    # Since version 4 and 5, so with the values that earlier paths were made with.
     direction_mode: DirectionMode = "taught"
     start: Start | None = None
+    origin_m: _Position | None = None
     line_order: LineOrder = "snake"
     heading: Heading = "travel"
     run_off_m: float = 0.0
@@ -211,6 +213,8 @@ class _StrategyContent(StrictModel):
     edge_contact_m: float = 0.0
     largest_turn_rad_m: float = LARGEST_TURN_RAD_M
     chord_error_m: float = 0.0
+    resample_step_m: float = 0.0
+    resample_turn_rad: float = RESAMPLE_TURN_RAD
     minimum_length_m: float | None = None
     join_gap_m: float | None = None
     constant_speed: bool = False
@@ -219,6 +223,8 @@ class _StrategyContent(StrictModel):
         content = {name: getattr(self, name) for name in type(self).model_fields}
         if self.direction is not None:
             content["direction"] = np.array(self.direction)
+        if self.origin_m is not None:
+            content["origin_m"] = np.array(self.origin_m)
         try:
             return Strategy(**content)
         except ProcessError as error:

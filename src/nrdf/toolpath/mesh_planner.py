@@ -20,6 +20,7 @@ from nrdf.toolpath.modifiers import (
     minimum_length,
     offset,
     one_way,
+    order_nearest,
     order_shortest,
     run_off,
     smooth_orientation,
@@ -27,6 +28,7 @@ from nrdf.toolpath.modifiers import (
     start_at,
 )
 from nrdf.toolpath.modifiers.join import Project
+from nrdf.toolpath.modifiers.one_way import begun_near
 from nrdf.toolpath.modifiers.order import Lift, way_between
 from nrdf.toolpath.modifiers.run_off import Free
 from nrdf.toolpath.planners import PLANNERS, Planner
@@ -34,7 +36,12 @@ from nrdf.toolpath.region_samples import sample_evenly
 from nrdf.toolpath.size_limits import check_passes, check_size
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
-from nrdf.toolpath.tool_segments import add_approach_retract, contact_points, steady_tool_segments
+from nrdf.toolpath.tool_segments import (
+    add_approach_retract,
+    contact_points,
+    fewer_waypoints,
+    steady_tool_segments,
+)
 from nrdf.toolpath.types import Segment
 
 _LARGEST_STEP = 2.0  # spacings inside a line
@@ -69,6 +76,8 @@ def plan_on_mesh(
     ]
     lines, normals = steady_tool_segments([path for once in passes for path in once], strategy)
     lines = edge_contact(lines, strategy.edge_contact_m, strategy.lead_rad, strategy.tilt_rad)
+    if strategy.resample_step_m > 0.0:
+        lines, normals = fewer_waypoints(lines, normals, strategy)
     if strategy.constant_speed:
         lines = constant_speed(lines, [contact_points(line, strategy) for line in lines])
     return add_approach_retract(lines, normals, replace(strategy, passes=1))
@@ -93,9 +102,8 @@ def modified(
     if strategy.joined_gap_m > 0.0:
         # Lines that run off the part are joined off it.
         way = project if strategy.run_off_m == 0.0 else _straight
-        joined = join(paths, way, spacing, strategy.joined_gap_m)
-        steady = smooth_orientation(split(joined, step), turn)
-        paths = order_shortest(steady, strategy.line_order == "one-way", _lift(strategy))
+        joined = join(paths, way, spacing, strategy.joined_gap_m, may_turn=_may_turn(strategy))
+        paths = _sequence(smooth_orientation(split(joined, step), turn), strategy)
     dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
     return offset(dragged, strategy.offset_m)
 
@@ -109,9 +117,11 @@ def _rows_in_order(
     """
     ordered = in_order(paths, region, strategy)
     gap, spacing = strategy.joined_gap_m, strategy.spacing_m
-    if gap <= 0.0 or strategy.run_off_m > 0.0 or strategy.line_order == "one-way":
+    if gap <= 0.0 or strategy.run_off_m > 0.0 or not _may_turn(strategy):
         return ordered
     tries = [join(ordered, project, spacing, gap)]
+    if strategy.line_order == "nearest":
+        return tries[0]
     rows = join(paths, project, spacing, gap)
     if len(rows) < len(paths):
         tries.append(join(in_order(rows, region, strategy), project, spacing, gap))
@@ -121,18 +131,41 @@ def _rows_in_order(
 def in_order(
     paths: Sequence[SurfacePath], region: RegionMesh, strategy: Strategy
 ) -> list[SurfacePath]:
-    """Paths in the strategy's order, from its start on, with short ways between them."""
+    """Paths in the strategy's order, from its start on, with short ways between them.
+
+    From the outside in, or from the inside out, planners' order stays: no ring comes before one
+    that is farther out, or in.
+    """
     one = strategy.line_order == "one-way"
     along, left = line_axes(region, strategy)
-    paths = one_way(paths, along) if one else list(paths)
     if strategy.start == "inside":
         # Planners make rings and spirals from the outside in.
         paths = [path.reversed() for path in reversed(paths)]
-    elif strategy.start not in (None, "outside"):
+    if one:
+        paths = [
+            path if strategy.in_rings and not path.closed else one_way([path], along)[0]
+            for path in paths
+        ]
+    if strategy.in_rings:
+        return begun_near(paths)
+    if strategy.start is not None:
         towards = along if strategy.start.startswith("far") else -along
         towards = towards + (left if strategy.start.endswith("left") else -left)
         paths = start_at(paths, towards, may_turn=not one)
-    return order_shortest(paths, one, _lift(strategy))
+    return _sequence(paths, strategy)
+
+
+def _sequence(paths: Sequence[SurfacePath], strategy: Strategy) -> list[SurfacePath]:
+    """Paths in the order that the strategy asks for, the first one first."""
+    if strategy.in_rings:
+        return list(paths)
+    make = order_nearest if strategy.line_order == "nearest" else order_shortest
+    return make(paths, strategy.line_order == "one-way", _lift(strategy))
+
+
+def _may_turn(strategy: Strategy) -> bool:
+    """Whether lines may be driven from either end, in any order."""
+    return strategy.line_order != "one-way" and not strategy.in_rings
 
 
 def _lift(strategy: Strategy) -> Lift:

@@ -18,6 +18,7 @@ Heading = Literal["travel", "fixed"]
 TRAJECTORIES: tuple[Trajectory, ...] = get_args(Trajectory)
 LARGEST_TURN_RAD_M = float(np.radians(3.0)) * 1e3
 """3° a mm."""
+RESAMPLE_TURN_RAD = float(np.radians(5.0))
 _LEAST, _MOST = 1e-9, 1e6  # of every quantity: beyond, sums and squares are no longer numbers
 _NAMES = {
     "trajectory": Trajectory, "direction_mode": DirectionMode, "start": Start,
@@ -25,12 +26,12 @@ _NAMES = {
 }  # fmt: skip
 _ABOVE_ZERO = (
     "stepover_m", "spacing_m", "tool_radius_m", "feed_m_s", "approach_feed_m_s",
-    "retract_feed_m_s", "passes", "largest_turn_rad_m",
+    "retract_feed_m_s", "passes", "largest_turn_rad_m", "resample_turn_rad",
 )  # fmt: skip
 _AT_LEAST_ZERO = (
     "edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m", "retract_distance_m",
     "dwell_s", "run_off_m", "run_off_height_m", "lead_in_radius_m", "lead_out_radius_m",
-    "edge_contact_m", "chord_error_m", "minimum_length_m", "join_gap_m",
+    "edge_contact_m", "chord_error_m", "resample_step_m", "minimum_length_m", "join_gap_m",
 )  # fmt: skip
 _EITHER_SIGN = ("offset_m", "drag_m")
 
@@ -44,7 +45,10 @@ class Strategy:
     surface; None for the region's longest extent. direction_mode: "taught" and "fixed" take it as
     it is; "principal" is the region's longest extent; "across" is square to what else it would be.
     start: where the first line begins: near or far along the lines' direction, left or right of it
-    seen from outside; outside or inside of rings and spirals; None: wherever the planner begins.
+    seen from outside; outside or inside of rings, edges and spirals, which are then driven from the
+    outside in or from the inside out; None: wherever the planner begins. origin_m: (3,) of a place
+    in the surface's frame that a line of a raster passes through, the others at whole stepovers
+    from it; None: the lines lie evenly between the region's borders.
     line_order: "zigzag" joins lines on the surface, back and forth; "snake" lifts between them;
     "one-way" drives all in one direction; "nearest" goes on at the nearest end.
     stepover_m: between neighbouring lines, along the surface; spacing_m: between waypoints, about;
@@ -59,7 +63,9 @@ class Strategy:
     run_off_m: lines go on that far beyond their ends, and rise run_off_height_m there.
     lead_in_radius_m, lead_out_radius_m: of the arcs on which the tool lands and leaves.
     largest_turn_rad_m: of the tool's axis, for each m of the way. chord_error_m: of the straight
-    way between waypoints, 0 where they are evenly spaced. minimum_length_m: shorter lines go where
+    way between waypoints, 0 where they are evenly spaced. resample_step_m: waypoints are left out
+    where straight steps up to that long stay within the chord error, and the tool turns by no more
+    than resample_turn_rad over each; 0: none. minimum_length_m: shorter lines go where
     nothing is lost with them; None: the tool's radius. join_gap_m: the widest gap that is joined on
     the surface; None: three stepovers for a zigzag, else 0. constant_speed: the feed is that of the
     contact, not of the tool centre point.
@@ -90,6 +96,7 @@ class Strategy:
     retract_feed_m_s: float = 0.25
     direction_mode: DirectionMode = "taught"
     start: Start | None = None
+    origin_m: np.ndarray | None = None
     line_order: LineOrder = "zigzag"
     heading: Heading = "travel"
     run_off_m: float = 0.0
@@ -101,6 +108,8 @@ class Strategy:
     edge_contact_m: float = 0.0
     largest_turn_rad_m: float = LARGEST_TURN_RAD_M
     chord_error_m: float = 0.0
+    resample_step_m: float = 0.0
+    resample_turn_rad: float = RESAMPLE_TURN_RAD
     minimum_length_m: float | None = None
     join_gap_m: float | None = None
     constant_speed: bool = False
@@ -125,6 +134,15 @@ class Strategy:
             direction = np.asarray(self.direction, dtype=np.float64)
             if direction.shape != (3,) or not 0.0 < np.linalg.norm(direction) < np.inf:
                 raise ProcessError(f"direction is {self.direction}; give 3 numbers, not all 0")
+        if self.origin_m is not None:
+            origin = np.asarray(self.origin_m, dtype=np.float64)
+            if origin.shape != (3,) or not np.abs(origin).max() <= _MOST:
+                raise ProcessError(f"origin_m is {self.origin_m}; give 3 numbers, in metres")
+
+    @property
+    def in_rings(self) -> bool:
+        """Whether lines are driven strictly from the outside in, or from the inside out."""
+        return self.start in ("outside", "inside")
 
     @property
     def least_line_m(self) -> float:

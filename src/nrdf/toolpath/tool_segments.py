@@ -13,6 +13,7 @@ from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
 from nrdf.toolpath.modifiers.approach_retract import FreeMove, approach_retract
 from nrdf.toolpath.modifiers.offset import edge_offset
+from nrdf.toolpath.modifiers.resample import kept_waypoints
 from nrdf.toolpath.modifiers.smooth_orientation import LARGEST_TILT_RAD, turned_steadily
 from nrdf.toolpath.modifiers.split import LEAST_STEP_M, cut, turns
 from nrdf.toolpath.size_limits import check_passes
@@ -67,6 +68,29 @@ def steady_tool_segments(
         segments.append(_segment(len(segments), path, held, strategy))
         normals.append(path.normals)
     return segments, normals
+
+
+def fewer_waypoints(
+    lines: Sequence[Segment], normals: Sequence[np.ndarray], strategy: Strategy
+) -> tuple[list[Segment], list[np.ndarray]]:
+    """Process segments, and the normals (n, 3) under each, without waypoints between which the way
+    is straight and the tool does not turn: as the strategy's chord error, resample_turn_rad and
+    resample_step_m have it."""
+    thin, under = [], []
+    for line, outward in zip(lines, normals, strict=True):
+        held = Rotation.from_quat(line.quaternions_xyzw)
+        turned = np.append(0.0, np.cumsum((held[:-1].inv() * held[1:]).magnitude()))
+        kept = kept_waypoints(
+            contact_points(line, strategy), turned, strategy.chord_error_m,
+            strategy.resample_turn_rad, strategy.resample_step_m,
+        )  # fmt: skip
+        thin.append(
+            replace(
+                line, positions=line.positions[kept], quaternions_xyzw=line.quaternions_xyzw[kept]
+            )
+        )
+        under.append(outward[kept])
+    return thin, under
 
 
 def add_approach_retract(

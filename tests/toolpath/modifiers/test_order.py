@@ -28,10 +28,12 @@ def test_every_path_is_driven_once_the_nearest_next():
 
 
 def test_a_shorter_order_than_the_nearest_next_is_kept():
-    # From 0 the nearest next is 0.01, then everything on the other side is far.
-    given = rows([0.0, -0.011, -0.04, 0.010, 0.03], length=0.01)
-    made = order_nearest(given)
-    assert way_between(made) <= way_between(given)
+    # The nearest next is always farther up, until the one below is left for last.
+    given = rows([0.0, -0.011, 0.01, 0.03, 0.07], length=0.001)
+    nearest = order_nearest(given, one_way=True)
+    assert [path.contacts[0, 1] for path in nearest] == [0.0, 0.01, 0.03, 0.07, -0.011]
+    assert way_between(order_shortest(given, one_way=True)) <= way_between(given)
+    assert way_between(given) < way_between(nearest)
     assert order_nearest(given[:2]) == given[:2]
     assert order_nearest([]) == []
 

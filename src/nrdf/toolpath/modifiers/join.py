@@ -24,13 +24,15 @@ def join(
     spacing_m: float,
     largest_gap_m: float,
     largest_turn_rad: float = LARGEST_TURN_RAD,
+    may_turn: bool = True,
 ) -> list[SurfacePath]:
     """Paths in the same order, those joined whose end and next start are close.
 
     The points between, at most `spacing_m` apart, are projected to the surface, so that nothing
     leads through the air or through the part. A gap above `largest_gap_m`, or a turn of the normal
     above `largest_turn_rad`, stays a gap; so does one whose way leaves the region, or jumps on it.
-    Turned to drive on from the nearer end, each path after the first may be driven backwards.
+    Turned to drive on from the nearer end, each path after the first may be driven backwards, if
+    `may_turn`.
     """
     if not paths:
         return []
@@ -38,7 +40,7 @@ def join(
     for path in paths[1:]:
         place = turned[-1].contacts[-1]
         near, far = (np.linalg.norm(path.contacts[k] - place) for k in (0, -1))
-        turned.append(path if near <= far else path.reversed())
+        turned.append(path.reversed() if may_turn and far < near else path)
     ways = _ways(turned, project, spacing_m, largest_gap_m, largest_turn_rad)
     joined: list[list[SurfacePath]] = [[turned[0]]]
     for way, path in zip(ways, turned[1:], strict=True):

@@ -27,6 +27,18 @@ def one_way(paths: Sequence[SurfacePath], direction: np.ndarray) -> list[Surface
     return turned
 
 
+def begun_near(paths: Sequence[SurfacePath]) -> list[SurfacePath]:
+    """Paths in the same order, each closed one begun at its contact nearest to where the one before
+    ends."""
+    begun: list[SurfacePath] = []
+    for path in paths:
+        if path.closed and begun:
+            away = np.linalg.norm(path.contacts[:-1] - begun[-1].contacts[-1], axis=1)
+            path = path.from_contact(int(np.argmin(away)))
+        begun.append(path)
+    return begun
+
+
 def start_at(
     paths: Sequence[SurfacePath], towards: np.ndarray, may_turn: bool = True
 ) -> list[SurfacePath]:

@@ -38,10 +38,10 @@ class Lift:
 def order_nearest(
     paths: Sequence[SurfacePath], one_way: bool = False, lift: Lift = Lift()
 ) -> list[SurfacePath]:
-    """The same paths in a shorter order: from each one's end to the nearest end of another.
+    """The same paths, from each one's end on to the nearest end of one that is left.
 
-    Paths may be driven backwards, unless `one_way`. The first one stays first. An order that is
-    not shorter than the one that was given is not taken. lift: what counts beside the ways.
+    Paths may be driven backwards, unless `one_way`. The first one stays first. lift: what counts
+    beside the ways.
     """
     if len(paths) < 3:
         return list(paths)
@@ -58,18 +58,19 @@ def order_nearest(
         which, backwards = int(left[k]), bool(end)
         ordered.append(paths[which].reversed() if backwards else paths[which])
         place = ends[which, 0 if backwards else 1]
-    return ordered if way_between(ordered, lift) < way_between(paths, lift) else list(paths)
+    return ordered
 
 
 def order_shortest(
     paths: Sequence[SurfacePath], one_way: bool = False, lift: Lift = Lift()
 ) -> list[SurfacePath]:
-    """The same paths in the shortest order that is found: nearest next, then runs of them turned
-    around wherever that makes the ways between shorter.
+    """The same paths in the shortest order that is found: nearest next, or as they are given where
+    that is shorter; then runs of them turned around wherever that makes the ways between shorter.
 
     As `order_nearest` says of the first path, of `one_way`, for which no run is turned, and `lift`.
     """
-    ordered = order_nearest(paths, one_way, lift)
+    tries = [list(paths), order_nearest(paths, one_way, lift)]
+    ordered = min(tries, key=lambda tried: way_between(tried, lift))
     if one_way or not 2 < len(ordered) <= _MOST_TURNED:
         return ordered
     starts, stops = _ends(ordered, 0), _ends(ordered, -1)

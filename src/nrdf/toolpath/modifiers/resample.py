@@ -29,8 +29,20 @@ def resample(
 def _resampled(
     path: SurfacePath, chord_error_m: float, largest_turn_rad: float, largest_step_m: float
 ) -> SurfacePath:
-    contacts = path.contacts
     turned = np.concatenate([[0.0], np.cumsum(turns(path.normals))])
+    kept = kept_waypoints(path.contacts, turned, chord_error_m, largest_turn_rad, largest_step_m)
+    return replace(path, contacts=path.contacts[kept], normals=path.normals[kept])
+
+
+def kept_waypoints(
+    contacts: np.ndarray,
+    turned: np.ndarray,
+    chord_error_m: float,
+    largest_turn_rad: float,
+    largest_step_m: float = np.inf,
+) -> np.ndarray:
+    """Which (k,) of contacts (n, 3), m, stay, as `resample` says; turned: (n,), rad, the sum of
+    all turns up to each."""
     kept, last = [0], len(contacts) - 1
     while kept[-1] < last:
         start = kept[-1]
@@ -43,7 +55,7 @@ def _resampled(
         ):
             stop += 1
         kept.append(stop)
-    return replace(path, contacts=contacts[kept], normals=path.normals[kept])
+    return np.array(kept)
 
 
 def _sag(points: np.ndarray) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from nrdf.surface.region_mesh import RegionMesh
@@ -15,19 +17,22 @@ _ON_EDGE = 1e-3  # of the stepover: an edge path without margin runs that far in
 
 
 def plan_contour(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
-    """Closed rings at even distances from the border, the holes' too, from the outside in.
+    """Closed rings at even distances from the border, the holes' too.
 
-    A part without a border has its rings around its end. Raises ProcessError for a margin that
-    leaves nothing.
+    With a start, outside or inside, every ring comes after those that are farther out. A part
+    without a border has its rings around its end. Raises ProcessError for a margin that leaves
+    nothing.
     """
     found = []
     for part in parts_of(region, strategy):
-        found += driven(region, part, ring_lines(part, strategy), strategy)
+        found += _in_turn(region, part, ring_lines(part, strategy), strategy)
     return checked(found, strategy)
 
 
 def plan_edge(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """One loop along the outer border and one around every hole, `edge_margin_m` inside.
+
+    With a start, outside or inside, the outer border comes before the holes.
 
     Raises ProcessError for a margin that leaves nothing, as where there is no border.
     """
@@ -36,10 +41,24 @@ def plan_edge(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
         distance = part.border_distance
         if distance is not None:
             at = max(strategy.edge_margin_m, _ON_EDGE * strategy.stepover_m)
-            found += driven(
-                region, part, level_lines(part.mesh, distance, np.array([at])), strategy
-            )
+            loops = level_lines(part.mesh, distance, np.array([at]))
+            # The outer border is the loop around all others.
+            loops.sort(key=lambda loop: -float(np.linalg.norm(np.ptp(loop.points, axis=0))))
+            of_turn = [replace(loop, level=min(k, 1)) for k, loop in enumerate(loops)]
+            found += _in_turn(region, part, of_turn, strategy)
     return checked(found, strategy)
+
+
+def _in_turn(
+    region: RegionMesh, part: Part, lines: list[MeshLine], strategy: Strategy
+) -> list[SurfacePath]:
+    """Lines as paths: level by level where the strategy says where they start, else so that ways
+    are short."""
+    if strategy.start not in ("outside", "inside"):
+        return driven(region, part, lines, strategy)
+    levels = sorted({line.level for line in lines})
+    each = [[line for line in lines if line.level == level] for level in levels]
+    return [path for same in each for path in driven(region, part, same, strategy)]
 
 
 def ring_distance(part: Part) -> np.ndarray:
@@ -52,4 +71,4 @@ def ring_distance(part: Part) -> np.ndarray:
 
 def ring_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
     """Level lines of the distance from the border, a stepover apart."""
-    return lines_at(part, ring_distance(part), strategy)
+    return lines_at(part, ring_distance(part), replace(strategy, origin_m=None))

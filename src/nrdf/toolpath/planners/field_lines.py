@@ -16,6 +16,7 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.level_lines import MeshLine, cut_where, level_lines, resampled
 from nrdf.toolpath.planners.ordering import snake_order
+from nrdf.toolpath.planners.origin import extent, levels_through, value_at
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
@@ -111,11 +112,9 @@ def even_levels(
     up to that width one line in the middle will do. more: lines that are added, closer together.
     tail: share of the area at either end that makes the part no wider.
     """
-    order = np.argsort(values)
-    share = np.cumsum(weights[order]) / float(weights.sum())
-    low, high = np.interp([tail, 1.0 - tail], share, values[order])
-    width = float(high - low)
-    most = float(np.ptp(np.interp([_TAIL, 1.0 - _TAIL], share, values[order])))
+    low, high = extent(values, weights, tail)
+    width = high - low
+    most = float(np.ptp(extent(values, weights, _TAIL)))
     count = 1 if most <= single_m else max(int(np.ceil(width / stepover_m - 0.02)), 1)
     apart = max(width / count, _LEAST_SPACING * stepover_m)
     if more:
@@ -197,7 +196,8 @@ def lines_at(
 ) -> list[MeshLine]:
     """Lines of a distance (v,) across a part, one stepover apart, inside the margin.
 
-    more: lines that are added, closer together. tail: as `even_levels` has it.
+    more: lines that are added, closer together. tail: as `even_levels` has it. With an origin, a
+    line passes through it, and the others are at whole stepovers from it.
     """
     weight, margin = part.mesh.mass, strategy.edge_margin_m
     if margin > 0.0 and part.border_distance is not None:
@@ -207,6 +207,11 @@ def lines_at(
     levels = even_levels(
         values, weight, strategy.stepover_m, _SINGLE * strategy.tool_radius_m, more, tail
     )
+    if strategy.origin_m is not None:
+        apart = float(np.diff(levels).min()) if more else strategy.stepover_m
+        through = value_at(part.mesh, values, strategy.origin_m)
+        low, high = extent(values, weight, tail)
+        levels = levels_through(through, low, high, apart, strategy.tool_radius_m)
     return _needed(part.inside(level_lines(part.mesh, values, levels), margin), strategy)
 
 
