@@ -20,7 +20,7 @@ def toolpaths(
     trajectory: Trajectory = "raster",
     edge_margin_mm: NonNegative = 0.0,
     meshes: tuple[Annotated[Path, Metavar("FOLDER")], ...] = (),
-    planner: str = "auto",
+    planner: tuple[Annotated[str, Metavar("PLANNER")], ...] = ("auto",),
     surface: Literal["mesh", "votes", "scan"] = "mesh",
     sample: Count | None = None,
     out: Folder | None = None,
@@ -34,11 +34,14 @@ def toolpaths(
 
     With --meshes, on real meshes instead, and every figure is measured on the mesh that was given,
     beside the bar that it is held to. A folder with labels.json holds labelled furniture, scaled to
-    0.9 m; one named car holds cars of 4.5 m, on whose bonnet, roof and door is planned; any other
-    mesh is one region, of 1.05 m. Interrupted, the same command goes on. docs/evidence/toolpaths.md
-    defines the figures.
+    0.9 m; one named car holds cars of 4.5 m, on whose bonnet, roof and door is planned; one named
+    plane aircraft of 4.5 m, on whose right wing is planned; any other mesh is one region, of
+    1.05 m. With more than one planner, they are shown side by side. Interrupted, the same command
+    goes on. docs/evidence/toolpaths.md defines the figures.
 
-    Example: nrdf eval toolpaths --category chair --data bsrc/
+    Examples:
+        nrdf eval toolpaths --category chair --data bsrc/
+        nrdf eval toolpaths --meshes objects/ikea shapes/car --planner auto plane-slices --out out/
 
     Args:
         category: chair, car, plane or table; or give --meshes.
@@ -47,13 +50,14 @@ def toolpaths(
         trajectory: A planner's name in nrdf.toolpath.planners; not for --meshes.
         edge_margin_mm: Margin along the regions' borders; not for --meshes.
         meshes: Folders of meshes, or mesh files.
-        planner: With --meshes: "auto", rods for legs, rails and armrests and rasters for all else;
-            or a planner's name in nrdf.toolpath.planners.
+        planner: With --meshes, one or more: "auto", rods for legs, rails and armrests and rasters
+            for all else; or a planner's name in nrdf.toolpath.planners.
         surface: What is planned on: the mesh with its own faces as
             regions; "votes": the mesh, regions by votes of points as in retrieval; "scan": a mesh
             made of a simulated scan of three views, 200,000 points with noise of 1 mm.
         sample: Only so many meshes of each folder, evenly chosen.
-        out: Folder for the results on meshes: tables, and a row a region as CSV and JSON.
+        out: Folder for the results on meshes: tables, a row a region as CSV and JSON, and a picture
+            of each mesh with its paths in pictures/.
         overwrite: Start anew, whatever is in the folder.
     """
     if meshes:
@@ -99,18 +103,20 @@ def toolpaths(
 
 def _on_meshes(
     meshes: tuple[Path, ...],
-    planner: str,
+    planners: tuple[str, ...],
     surface: Literal["mesh", "votes", "scan"],
     sample: int | None,
     out: Path | None,
     overwrite: bool,
 ) -> None:
-    from nrdf_benchmark.mesh_paths.evaluate import evaluate_mesh_paths
+    from nrdf_benchmark.mesh_paths.evaluate import MeshPathResult, evaluate_mesh_paths
     from nrdf_benchmark.mesh_paths.table import (
         HEADINGS,
+        comparison,
         mesh_rows,
         selections,
         totals,
+        write_comparison,
         write_results,
     )
     from nrdf_benchmark.mesh_paths.targets import target_sources
@@ -118,23 +124,39 @@ def _on_meshes(
 
     sources = target_sources(meshes, sample)
     cache = None if out is None else LineCache(out, overwrite)
-    with progress_bar(f"meshes, {planner}") as progress:
-        results = evaluate_mesh_paths(sources, planner, cache, progress, surface)
-    title = f"Tool paths on {len(sources)} meshes, planner {planner}"
-    if surface != "mesh":
-        title += f", on {surface}"
-    for what, chosen in selections(results):
-        shown = table(f"\n{title}: {what}, {len(chosen)}", "", *HEADINGS)
-        for row in mesh_rows(chosen):
-            shown.add_row(row.name, *row.cells)
-        show(shown)
-    console.print(totals(results))
-    for result in results:
-        if result.error:
-            console.print(f"{result.target}, {result.region}: no path: {result.error}")
-    if out is not None:
-        from nrdf.training.provenance import git_commit
+    by_planner: dict[str, list[MeshPathResult]] = {}
+    written = []
+    for planner in dict.fromkeys(planners):
+        pictures = None if out is None else out / "pictures" / f"{planner}-{surface}"
+        if pictures is not None:
+            pictures.mkdir(parents=True, exist_ok=True)
+        with progress_bar(f"meshes, {planner}") as progress:
+            results = evaluate_mesh_paths(sources, planner, cache, progress, surface, pictures)
+        by_planner[planner] = results
+        title = f"Tool paths on {len(sources)} meshes, planner {planner}"
+        if surface != "mesh":
+            title += f", on {surface}"
+        for what, chosen in selections(results):
+            shown = table(f"\n{title}: {what}, {len(chosen)}", "", *HEADINGS)
+            for row in mesh_rows(chosen):
+                shown.add_row(row.name, *row.cells)
+            show(shown)
+        console.print(totals(results))
+        for result in results:
+            if result.error:
+                console.print(f"{result.target}, {result.region}: no path: {result.error}")
+        if out is not None:
+            from nrdf.training.provenance import git_commit
 
-        origin = {"command": command_line(), "versions": versions(), "commit": git_commit()}
-        written = write_results(out, results, title, origin)
+            origin = {"command": command_line(), "versions": versions(), "commit": git_commit()}
+            written += write_results(out, f"{planner}-{surface}", results, title, origin)
+    if len(by_planner) > 1:
+        for what, rows in comparison(by_planner):
+            shown = table(f"\n{what}: met by; median; worst", "", "bar", *by_planner)
+            for cells in rows:
+                shown.add_row(*cells)
+            show(shown)
+        if out is not None:
+            written.append(write_comparison(out, by_planner))
+    if written:
         console.print("wrote " + ", ".join(str(path) for path in written))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from nrdf.errors import DataError, NrdfError, unknown_name
@@ -15,6 +16,7 @@ from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.planners import PLANNERS
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
+from nrdf.viz.picture import Panel, draw_regions
 from nrdf_benchmark.mesh_paths.found_surface import SurfaceKind, regions_on
 from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics, measure_mesh_path
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, TargetSource
@@ -44,7 +46,8 @@ class MeshPathResult:
 
 
 RegionPlanner = Callable[[str], tuple[tuple[Segment, ...], RegionMesh | None]]
-"""From a region's name to its path, and the region that was found, where it was not given."""
+"""From a region's name to its path, and the mesh that it was planned on."""
+PICTURE_PX = 1000
 
 
 def usual_planner(region: str) -> str:
@@ -58,12 +61,14 @@ def evaluate_mesh_paths(
     cache: LineCache | None = None,
     progress: Callable[[int, int], None] | None = None,
     surface: SurfaceKind = "mesh",
+    pictures: Path | None = None,
 ) -> list[MeshPathResult]:
     """Plan and measure on every region; meshes that `cache` has are not planned on again.
 
     planner: a name in `nrdf.toolpath.planners.PLANNERS`, or `AUTO`. surface: what it plans on.
-    `progress` is told (done, all). Raises DataError for a planner that there is not, or a mesh that
-    cannot be used.
+    pictures: a folder that is there, for a picture of each mesh that is planned on. `progress` is
+    told (done, all). Raises DataError for a planner that there is not, or a mesh that cannot be
+    used.
     """
     if planner not in (AUTO, *PLANNERS):
         raise DataError(unknown_name("planner", planner, [AUTO, *PLANNERS]))
@@ -74,7 +79,7 @@ def evaluate_mesh_paths(
     for number, (mark, source) in enumerate(zip(marks, sources, strict=True)):
         found = _parse(lines.get(source.name))
         if found is None:
-            found = _evaluate(source.read(), planner, surface)
+            found = _evaluate(source.read(), planner, surface, pictures)
             if cache:
                 cache.append(file, mark, {"results": [asdict(result) for result in found]})
         results += found
@@ -83,12 +88,15 @@ def evaluate_mesh_paths(
     return results
 
 
-def _evaluate(target: MeshTarget, planner: str, surface: SurfaceKind) -> list[MeshPathResult]:
+def _evaluate(
+    target: MeshTarget, planner: str, surface: SurfaceKind, pictures: Path | None
+) -> list[MeshPathResult]:
     strategy = target.strategy
     start = time.process_time()
     make = _on_mesh(target, planner, strategy, surface)
     shared = (time.process_time() - start) / max(len(target.visible_regions), 1)
     results = []
+    drawn: dict[str, tuple[RegionMesh, tuple[Segment, ...]]] = {}
     for region in target.visible_regions:
         name = usual_planner(region) if planner == AUTO else planner
         segments: tuple[Segment, ...] = ()
@@ -100,11 +108,31 @@ def _evaluate(target: MeshTarget, planner: str, surface: SurfaceKind) -> list[Me
             error = str(failed)
         seconds = shared + time.process_time() - start
         if any(segment.kind == "process" for segment in segments):
-            metrics = measure_mesh_path(target, region, segments, strategy, found)
+            judged = None if surface == "mesh" else found
+            metrics = measure_mesh_path(target, region, segments, strategy, judged)
         elif not error:
             error = "the planner made no process segment"
         results.append(MeshPathResult(name, target.name, region, seconds, metrics, error))
+        if found is not None:
+            drawn[region] = (found, segments)
+    if pictures is not None and drawn:
+        _draw(target, drawn, pictures / f"{target.name.replace('/', '-')}.png")
     return results
+
+
+def _draw(
+    target: MeshTarget, drawn: Mapping[str, tuple[RegionMesh, tuple[Segment, ...]]], path: Path
+) -> None:
+    """The strokes on their regions, and the ways between them, on the mesh that was planned on."""
+    off = target.strategy.standoff_m
+    lines, moves = {}, []
+    for region, (_, segments) in drawn.items():
+        strokes = [s for s in segments if s.kind == "process"]
+        lines[region] = [s.positions + off * s.axes for s in strokes]
+        moves += [s.positions for s in segments if s.kind != "process"]
+    whole = next(iter(drawn.values()))[0].parent
+    regions = {region: found.mesh for region, (found, _) in drawn.items()}
+    draw_regions([Panel.of_mesh(target.name, whole, regions, lines, moves)], path, PICTURE_PX)
 
 
 def _on_mesh(
@@ -115,8 +143,7 @@ def _on_mesh(
     def make(region: str) -> tuple[tuple[Segment, ...], RegionMesh | None]:
         found = find(region)
         name = usual_planner(region) if planner == AUTO else planner
-        segments = plan_on_mesh(found, strategy, PLANNERS[name])
-        return segments, None if surface == "mesh" else found
+        return plan_on_mesh(found, strategy, PLANNERS[name]), found
 
     return make
 

@@ -17,7 +17,7 @@ from nrdf_benchmark.mesh_paths.evaluate import MeshPathResult
 from nrdf_benchmark.mesh_paths.measure import MeshPathMetrics
 
 HEADINGS = ("bar", "met by", "median", "worst")
-STEM = "toolpaths"
+COMPARISON = "comparison.md"
 
 
 @dataclass(frozen=True)
@@ -80,14 +80,7 @@ def mesh_rows(results: Sequence[MeshPathResult]) -> list[MeshRow]:
     """A row for each figure, over all regions that have a path."""
     rows = []
     for figure in FIGURES:
-        asked = [
-            result.metrics
-            for result in results
-            if result.metrics is not None
-            and (not figure.roles or result.region in figure.roles)
-            and (not figure.planners or result.planner in figure.planners)
-        ]
-        values = np.array([v for m in asked if (v := figure.value(m)) is not None])
+        values = _values(figure, results)
         if not len(values):
             continue
         met = values >= figure.limit if figure.least else values <= figure.limit
@@ -96,6 +89,50 @@ def mesh_rows(results: Sequence[MeshPathResult]) -> list[MeshRow]:
         cells = (figure.bar, share, _short(np.median(values)), _short(worst))
         rows.append(MeshRow(figure.name, cells))
     return rows
+
+
+def comparison(
+    by_planner: Mapping[str, Sequence[MeshPathResult]],
+) -> list[tuple[str, list[tuple[str, ...]]]]:
+    """Planners side by side on the regions that all of them planned: for flat and for curved ones
+    the rows, each of a figure's name, its bar and, for each planner, "met by; median; worst"."""
+    planned = [
+        {(r.target, r.region) for r in results if r.metrics is not None}
+        for results in by_planner.values()
+    ]
+    common = set.intersection(*planned)
+    # Curvature is the given mesh's, so that any planner's results tell it.
+    first = next(iter(by_planner.values()))
+    kinds = {(r.target, r.region): r.metrics.curved for r in first if r.metrics is not None}
+    tables = []
+    for what, curved in (("flat regions", False), ("curved regions", True)):
+        keys = {key for key in common if kinds[key] == curved}
+        chosen = {
+            name: [r for r in results if (r.target, r.region) in keys]
+            for name, results in by_planner.items()
+        }
+        columns = [{row.name: row.cells for row in mesh_rows(own)} for own in chosen.values()]
+        rows = []
+        for figure in FIGURES:
+            if any(figure.name in column for column in columns):
+                cells = [
+                    "; ".join(filter(None, c.get(figure.name, ("",) * 4)[1:])) for c in columns
+                ]
+                rows.append((figure.name, figure.bar, *cells))
+        tables.append((f"{what}, {len(keys)}", rows))
+    return tables
+
+
+def _values(figure: _Figure, results: Sequence[MeshPathResult]) -> np.ndarray:
+    """What a figure is on those regions (n,) that have it."""
+    asked = [
+        result.metrics
+        for result in results
+        if result.metrics is not None
+        and (not figure.roles or result.region in figure.roles)
+        and (not figure.planners or result.planner in figure.planners)
+    ]
+    return np.array([v for m in asked if (v := figure.value(m)) is not None])
 
 
 def totals(results: Sequence[MeshPathResult]) -> str:
@@ -155,9 +192,13 @@ def to_csv(results: Sequence[MeshPathResult]) -> str:
 
 
 def write_results(
-    folder: Path, results: Sequence[MeshPathResult], title: str, origin: Mapping[str, Any]
+    folder: Path,
+    name: str,
+    results: Sequence[MeshPathResult],
+    title: str,
+    origin: Mapping[str, Any],
 ) -> list[Path]:
-    """The tables as Markdown, the figures as CSV and JSON: the files' paths."""
+    """The tables as Markdown, the figures as CSV and JSON: the paths of the files `name`.*."""
     content = {"origin": dict(origin), "results": [asdict(result) for result in results]}
     texts = {
         ".md": markdown(results, title),
@@ -166,10 +207,22 @@ def write_results(
     }
     written = []
     for suffix, text in texts.items():
-        path = folder / f"{STEM}{suffix}"
+        path = folder / f"{name}{suffix}"
         write_atomically(path, [text.encode()])
         written.append(path)
     return written
+
+
+def write_comparison(folder: Path, by_planner: Mapping[str, Sequence[MeshPathResult]]) -> Path:
+    """`comparison` as Markdown: the file's path."""
+    lines = ["# Planners side by side: met by; median; worst"]
+    for what, rows in comparison(by_planner):
+        lines += ["", f"## {what}", "", f"| | bar | {' | '.join(by_planner)} |"]
+        lines.append("|---" * (len(by_planner) + 2) + "|")
+        lines += [f"| {' | '.join(row)} |" for row in rows]
+    path = folder / COMPARISON
+    write_atomically(path, ["\n".join([*lines, ""]).encode()])
+    return path
 
 
 def _short(value: float) -> str:

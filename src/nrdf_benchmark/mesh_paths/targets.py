@@ -28,13 +28,14 @@ from nrdf.io.formats.meshes import load_mesh
 from nrdf.toolpath.strategy import Strategy
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh, read_labels, read_objects
 
-FURNITURE_M, CAR_M, WHOLE_M = 0.9, 4.5, 1.05
+FURNITURE_M, CAR_M, PLANE_M, WHOLE_M = 0.9, 4.5, 4.5, 1.05
 """Longest sides. A mesh that is one region measures 1.05 m: ten and a half units of 0.1 m."""
 FINE = Strategy(stepover_m=0.025, spacing_m=0.01, tool_radius_m=0.025)
 COARSE = Strategy(stepover_m=0.05, spacing_m=0.01, tool_radius_m=0.05)
-"""A pad of 50 mm for furniture and patches, one of 100 mm for cars; lines half of it apart."""
-CARS = "car"
-"""The name of a folder of cars: +X forward, +Y up."""
+"""A pad of 50 mm for furniture and patches, one of 100 mm for cars and aircraft; lines half of it
+apart."""
+CARS, PLANES = "car", "plane"
+"""Names of folders of cars and aircraft: +X forward, +Y up."""
 SAMPLES = 60_000  # points of the outer skin that figures are measured at
 LEAST_POINTS = 30  # of a region
 _SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
@@ -93,8 +94,8 @@ def target_sources(places: Sequence[Path], sample: int | None = None) -> list[Ta
     """All meshes of folders and files, in a fixed order; or `sample` of each place, evenly chosen.
 
     A folder with labels.json holds labelled objects (`nrdf_benchmark.objects.dataset`); one named
-    "car" holds cars; any other folder or file holds meshes that are a region each. Raises DataError
-    where there is none, or a file cannot be used.
+    "car" holds cars, one named "plane" aircraft; any other folder or file holds meshes that are a
+    region each. Raises DataError where there is none, or a file cannot be used.
     """
     found: list[TargetSource] = []
     for place in places:
@@ -117,7 +118,7 @@ def _sources(place: Path) -> Iterator[TargetSource]:
         files = sorted(path for path in place.iterdir() if path.suffix.lower() in _SUFFIXES)
     if not files or not files[0].is_file():
         raise DataError(f"{place}: no mesh there; give a folder of {', '.join(_SUFFIXES)} files")
-    make = car_target if place.name == CARS else whole_target
+    make = {CARS: car_target, PLANES: plane_target}.get(place.name, whole_target)
     for path in files:
         checksum = hashlib.sha256(path.read_bytes()).hexdigest()
         yield TargetSource(f"{place.stem}/{path.stem}", checksum, _reader(path, checksum, make))
@@ -169,6 +170,21 @@ def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str
     }  # fmt: skip
     regions = {part: _largest(faces, mask) for part, mask in masks.items() if mask.any()}
     return MeshTarget(name, CAR_M * vertices, faces, regions, checksum, COARSE)
+
+
+def plane_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
+    """An aircraft with the upper side of its right wing, told by the place and normal of faces."""
+    vertices = _scaled(vertices, 1.0)
+    faces = _outward(vertices, faces)
+    centre = vertices[faces].mean(axis=1)
+    cross = triangle_crosses(vertices, faces)
+    normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
+    back, front = vertices[:, 0].min(), vertices[:, 0].max()
+    along = (centre[:, 0] - back) / (front - back)  # 0 to 1; the tail's fins lie below 0.25
+    side = centre[:, 2] / vertices[:, 2].max()  # 1: the right wing's tip
+    mask = (normal[:, 1] > 0.5) & (along > 0.25) & (side > 0.2)
+    regions = {"wing": _largest(faces, mask)} if mask.any() else {}
+    return MeshTarget(name, PLANE_M * vertices, faces, regions, checksum, COARSE)
 
 
 def face_components(faces: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -41,7 +41,26 @@ def test_meshes_are_measured_beside_the_bars(monkeypatch, capsys, tmp_path):
     shown = capsys.readouterr().out
     assert "planner auto: all regions, 1" in shown.replace("\n", " ").replace("  ", " ")
     assert "contacts from given mesh, 99 %, mm" in shown and "<= 0.1" in shown
-    assert sorted(path.suffix for path in out.glob("toolpaths.*")) == [".csv", ".json", ".md"]
+    assert sorted(path.suffix for path in out.glob("auto-mesh.*")) == [".csv", ".json", ".md"]
+
+
+def test_two_planners_are_shown_side_by_side(capsys, tmp_path):
+    import trimesh
+
+    trimesh.creation.box((1.0, 0.4, 0.1)).export(tmp_path / "plate.ply")
+    given = [
+        "eval",
+        "toolpaths",
+        "--meshes",
+        str(tmp_path / "plate.ply"),
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    assert cli.run([*given, "--planner", "raster", "plane-slices"]) == 0
+    shown = capsys.readouterr().out
+    assert "flat regions, 1: met by; median; worst" in shown.replace("\n", " ").replace("  ", " ")
+    assert (tmp_path / "o" / "comparison.md").is_file()
+    assert (tmp_path / "o" / "pictures" / "raster-mesh").is_dir()
 
 
 def test_what_to_plan_on_has_to_be_given(capsys):

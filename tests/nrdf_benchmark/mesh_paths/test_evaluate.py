@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from builders.mesh_targets import plate_target, rows_on_top
 from nrdf.errors import DataError, ProcessError
@@ -34,6 +36,15 @@ def test_a_plate_is_planned_and_measured(source):
     assert (result.planner, result.target, result.region) == ("raster", "block", "top")
     assert result.metrics.coverage > 0.99 and result.metrics.distance_worst_m < 1e-6
     assert result.seconds > 0.0 and not result.error
+
+
+def test_each_mesh_has_a_picture_of_its_paths(source, tmp_path):
+    evaluate_mesh_paths([source], pictures=tmp_path)
+    (picture,) = tmp_path.iterdir()
+    assert picture.name == "block.png"
+    pixels = np.asarray(Image.open(picture).convert("RGB")).reshape(-1, 3)
+    coloured = np.ptp(pixels.astype(int), axis=1) > 40  # the region and its strokes
+    assert coloured.mean() > 0.05
 
 
 def test_meshes_that_were_done_are_not_planned_again(source, planned, tmp_path):

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
 
 from builders.mesh_targets import PLATE, plate_target, rows_on_top
 from nrdf_benchmark.mesh_paths.evaluate import MeshPathResult
 from nrdf_benchmark.mesh_paths.measure import measure_mesh_path
-from nrdf_benchmark.mesh_paths.table import FIGURES, mesh_rows, selections, totals, write_results
+from nrdf_benchmark.mesh_paths.table import (
+    FIGURES,
+    comparison,
+    mesh_rows,
+    selections,
+    totals,
+    write_comparison,
+    write_results,
+)
 
 
 @pytest.fixture
@@ -44,12 +53,25 @@ def test_rows_tell_how_many_regions_meet_a_bar(results):
 
 
 def test_files_hold_every_region(results, tmp_path):
-    text, table, content = write_results(tmp_path, results, "Paths", {"command": "nrdf"})
+    text, table, content = write_results(tmp_path, "rows", results, "Paths", {"command": "nrdf"})
     assert "| coverage, % | >= 99 | 0% |" in text.read_text()
     assert "- block, rim: no path: too narrow" in text.read_text()
+    assert [path.name for path in (text, table, content)] == ["rows.md", "rows.csv", "rows.json"]
     lines = list(csv.DictReader(table.read_text().splitlines()))
     assert [line["region"] for line in lines] == ["top", "raised", "rim"]
     assert float(lines[1]["distance_worst_m"]) == pytest.approx(1e-3)
     assert lines[2]["strokes"] == "" and lines[2]["error"] == "too narrow"
     read = json.loads(content.read_text())
     assert read["origin"] == {"command": "nrdf"} and len(read["results"]) == 3
+
+
+def test_planners_stand_side_by_side_on_regions_that_both_planned(results, tmp_path):
+    top, raised, rim = results
+    both = {"raster": [top, raised], "rival": [replace(top, planner="rival"), rim]}
+    (flat, rows), (curved, none) = comparison(both)
+    assert (flat, curved, none) == ("flat regions, 1", "curved regions, 0", [])
+    assert ("largest step, spacings", "<= 2", "100%; 1; 1", "100%; 1; 1") in rows
+    text = write_comparison(tmp_path, both).read_text()
+    assert (
+        "| | bar | raster | rival |" in text and "| strokes of a region |  | 2; 2 | 2; 2 |" in text
+    )

@@ -8,7 +8,13 @@ import trimesh
 
 from builders.labelled_boxes import write_objects
 from nrdf.errors import DataError
-from nrdf_benchmark.mesh_paths.targets import CAR_M, FURNITURE_M, WHOLE_M, target_sources
+from nrdf_benchmark.mesh_paths.targets import (
+    CAR_M,
+    FURNITURE_M,
+    PLANE_M,
+    WHOLE_M,
+    target_sources,
+)
 
 
 def box_car():
@@ -53,6 +59,23 @@ def test_a_car_has_bonnet_roof_and_right_door(tmp_path):
     assert middle["bonnet"][0] > 1.0 > middle["roof"][0]
     assert middle["roof"][1] > middle["bonnet"][1] > middle["door"][1]
     assert middle["door"][2] > 0.5
+
+
+def test_an_aircraft_has_the_upper_side_of_its_right_wing(tmp_path):
+    folder = tmp_path / "plane"
+    folder.mkdir()
+    at = trimesh.transformations.translation_matrix
+    parts = [trimesh.creation.box((4.0, 0.4, 0.4)), trimesh.creation.box((0.8, 0.1, 3.6))]
+    parts.append(trimesh.creation.box((0.4, 0.06, 1.4), at([-1.7, 0.1, 0.0])))  # the tail
+    for _ in range(3):
+        parts = [part.subdivide() for part in parts]
+    trimesh.util.concatenate(parts).export(folder / "glider.ply")
+    plane = target_sources([folder])[0].read()
+    assert set(plane.visible_regions) == {"wing"}
+    wing = plane.vertices[plane.faces[plane.regions["wing"]]].reshape(-1, 3)
+    scale = PLANE_M / 4.0
+    assert wing[:, 0].min() > -0.5 * scale and wing[:, 2].max() == pytest.approx(1.8 * scale)
+    assert np.allclose(wing[:, 1], 0.05 * scale)
 
 
 def test_any_other_mesh_is_one_region(tmp_path):
