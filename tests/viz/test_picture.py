@@ -53,6 +53,18 @@ def test_surface_is_closed_and_background_white(tmp_path):
     assert painted[distance > 1.04 * radius].mean() < 0.001
 
 
+def test_details_stand_beside_the_panel(tmp_path):
+    regions = {"upper": BALL[:, 1] > 0.8, "far": BALL[:, 0] > 0.8}
+    path = tmp_path / "details.png"
+    draw_regions([Panel("ball", BALL, BALL, regions)], path, 200, details=True)
+    image = matplotlib.image.imread(path)[..., :3]
+    whole, upper, far = (image[40:-50, 200 * k : 200 * (k + 1)] for k in range(3))
+    colours = region_colours(regions)
+    assert image.shape[1] == 600
+    assert like(upper, colours["upper"]).sum() > 2 * like(whole, colours["upper"]).sum()
+    assert like(far, colours["far"]).sum() > 2 * like(whole, colours["far"]).sum()
+
+
 def test_hidden_region_adds_a_view_from_where_it_is_seen(tmp_path):
     colour = region_colours(["far"])["far"]
     near = drawn(tmp_path, [Panel("ball", BALL, BALL, {"far": BALL[:, 0] > 0.8})])

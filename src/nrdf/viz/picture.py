@@ -97,16 +97,20 @@ class Panel:
         return _prepare(self, self.names)
 
 
-def draw_regions(panels: Sequence[Panel], path: str | Path, size: int = 420) -> None:
+def draw_regions(
+    panels: Sequence[Panel], path: str | Path, size: int = 420, details: bool = False
+) -> None:
     """Write a picture of `panels` side by side, one colour a region; `path`'s ending is its format.
 
     The same camera is used for all of them, and a second row is added from another side if some
     region could hardly be seen (beside the first for one panel). `size`: width of a panel in
-    pixels. Takes about 0.2 s a panel. Raises OutputError if the file cannot be written.
+    pixels. details: beside a panel that stands alone, each of its regions from its own side. Takes
+    about 0.2 s a panel. Raises OutputError if the file cannot be written.
     """
     rows, colours = render_panels(panels, size)
     if len(panels) == 1:
-        rows = [_of_one_height([row[0] for row in rows])]
+        close = render_details(panels[0], panels[0].names, size) if details else {}
+        rows = [_of_one_height([row[0] for row in rows] + list(close.values()))]
     _compose(rows, panels, colours, Path(path), size)
 
 

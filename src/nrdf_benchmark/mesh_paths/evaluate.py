@@ -47,7 +47,7 @@ class MeshPathResult:
 
 RegionPlanner = Callable[[str], tuple[tuple[Segment, ...], RegionMesh | None]]
 """From a region's name to its path, and the mesh that it was planned on."""
-PICTURE_PX = 1000
+PICTURE_PX = 700
 
 
 def usual_planner(region: str) -> str:
@@ -132,7 +132,8 @@ def _draw(
         moves += [s.positions for s in segments if s.kind != "process"]
     whole = next(iter(drawn.values()))[0].parent
     regions = {region: found.mesh for region, (found, _) in drawn.items()}
-    draw_regions([Panel.of_mesh(target.name, whole, regions, lines, moves)], path, PICTURE_PX)
+    panel = Panel.of_mesh(target.name, whole, regions, lines, moves)
+    draw_regions([panel], path, PICTURE_PX, details=True)
 
 
 def _on_mesh(

@@ -13,6 +13,7 @@ import igl
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from trimesh import remesh
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
@@ -38,6 +39,7 @@ CARS, PLANES = "car", "plane"
 """Names of folders of cars and aircraft: +X forward, +Y up."""
 SAMPLES = 60_000  # points of the outer skin that figures are measured at
 LEAST_POINTS = 30  # of a region
+_WING_EDGE = 0.02  # of an aircraft's longest side
 _SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 
 
@@ -173,8 +175,13 @@ def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str
 
 
 def plane_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
-    """An aircraft with the upper side of its right wing, told by the place and normal of faces."""
-    vertices = _scaled(vertices, 1.0)
+    """An aircraft with the upper side of its right wing, told by the place and normal of faces.
+
+    Wings are modelled in triangles as long as they are: divided, so that the region has a straight
+    border at the body.
+    """
+    vertices, faces = remesh.subdivide_to_size(_scaled(vertices, 1.0), faces, _WING_EDGE)
+    vertices, faces, _ = clean_faces(vertices, faces)
     faces = _outward(vertices, faces)
     centre = vertices[faces].mean(axis=1)
     cross = triangle_crosses(vertices, faces)
