@@ -17,8 +17,8 @@ MOST_PUBLIC_NAMES = 30
 
 LAYERS = (
     *("errors", "geometry", "io", "viz", "bundled", "shapes", "field", "training", "scans"),
-    *("regions", "surface", "toolpath", "process_model", "process", "reports", "export"),
-    *("robot.model", "robot.planning", "robot.simulation", "robot.report"),
+    *("regions", "surface", "toolpath", "process_model", "process", "reports", "cell", "export"),
+    *("robot.model", "robot.planning", "robot.simulation", "robot.report", "serve"),
     *("studio", "nrdf", "commands", "cli"),
 )
 """From the lowest to the highest; data flow down, so nothing imports what stands after it.

@@ -24,10 +24,12 @@ Exit codes: 0 all well; 1 some shapes not used; 2 bad input; 3 a limit is not
 met, or with --strict a result is doubtful; 4 nothing found or planned;
 130 Ctrl-C. With 3 and 4 the result is written all the same."""
 
-GROUPS = ("model", "eval")
+GROUPS = ("cell", "model", "eval")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
 BENCHMARK = ("eval", "ablate")
 """Verbs that come with `nrdf_benchmark`."""
+FOR_MAKERS = ("model", *BENCHMARK)
+"""Verbs that stand apart in the help."""
 RESUMABLE = (
     "ablate", "eval bsrc", "eval presence", "model boxes", "model correspond", "model kind",
     "model prepare", "model synth", "model train", "model yaw",
@@ -38,6 +40,7 @@ RESUMABLE = (
 def verbs() -> dict[str, Verb]:
     """Name to function; their modules import nothing heavy."""
     from nrdf.commands.align import align
+    from nrdf.commands.cell import cell
     from nrdf.commands.check import check
     from nrdf.commands.demo import demo
     from nrdf.commands.export import export
@@ -49,7 +52,20 @@ def verbs() -> dict[str, Verb]:
     from nrdf.commands.teach import teach
     from nrdf.commands.transfer import transfer
 
-    own = (teach, check, transfer, retrieve, align, export, simulate, studio, demo, info, model)
+    own = (
+        teach,
+        check,
+        transfer,
+        retrieve,
+        align,
+        cell,
+        export,
+        simulate,
+        studio,
+        demo,
+        info,
+        model,
+    )
     return {**{verb.__name__: verb for verb in own}, **_verbs_of_other_packages()}
 
 
@@ -157,7 +173,7 @@ def _with_axes_joined(given: list[str]) -> list[str]:
 
 def _show_verbs() -> None:
     known = verbs()
-    for_makers = [name for name in dict.fromkeys((*GROUPS, *BENCHMARK)) if name in known]
+    for_makers = [name for name in FOR_MAKERS if name in known]
     _say(USAGE)
     for name in [name for name in known if name not in for_makers]:
         _say(f"  {name:9} {_first_line(known[name])}")

@@ -161,7 +161,7 @@ def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):
     for words in (["--format", "csv", "krk"], ["--format", "csv", "krl", "--program", "if"]):
         with pytest.raises(ProcessError):
             exported(str(tmp_path), *words, "--out", str(tmp_path / "out"))
-    path.write_text(path.read_text().replace('"version":4', '"version":99'))
-    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 4"):
+    path.write_text(path.read_text().replace('"version":5', '"version":99'))
+    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 5"):
         exported(str(tmp_path), "--format", "csv", "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]

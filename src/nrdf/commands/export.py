@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Annotated, Literal
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, show, table, write_report
-from nrdf.commands.options import Folder, Metavar
+from nrdf.commands.options import File, Folder, Metavar
 
 Name = Annotated[str, Metavar("NAME")]
 
 
 def export(
     job: Positional[Folder],
-    format: tuple[str, ...],
+    format: tuple[str, ...] = (),
+    cell: File | None = None,
     out: Folder | None = None,
     program: Name | None = None,
     frame: Name | None = None,
@@ -37,11 +37,16 @@ def export(
     Formats: ros2-bag, noether, apt, gcode, urscript, rapid, krl, csv, json. Each gets a folder of
     its name in the output folder. What each carries, and how to load it: docs/guides/export.md.
 
+    With --cell the programs are in the robot's base frame, with the cell's tools named and
+    switched, and the formats are the cell's unless given. Nothing is written where a path is faster
+    or presses harder than the cell allows, or enters a keep-out box.
+
     Example: nrdf export job-new/ --format urscript csv
 
     Args:
         job: Folder that `nrdf transfer` wrote, with toolpaths.json in it.
-        format: One or more formats.
+        format: One or more formats; with --cell, the cell's unless given.
+        cell: Cell file, as `nrdf cell new` begins it.
         out: Folder to write; JOB/export unless given.
         program: The program's name, made to fit each controller's rules; nrdf_CATEGORY unless
             given.
@@ -63,32 +68,52 @@ def export(
             meet in the origin.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.export.options import Options
+    from nrdf.cell.file import read_cell
+    from nrdf.cell.placement import place_job
+    from nrdf.errors import ConfigError
+    from nrdf.export.options import Options, options_of_cell
     from nrdf.export.registry import check_formats, export_job
     from nrdf.io.output import output_folder
     from nrdf.toolpath.file import read_toolpaths
 
-    options = Options(
-        program=program,
-        frame=frame,
-        tool=tool,
-        tool_z=tool_z,
-        tool_number=tool_number,
-        frame_number=frame_number,
-        program_number=program_number,
-        process_only=process_only,
-        blend_mm=blend_mm,
-        acceleration_m_s2=acceleration_m_s2,
-        rotary=rotary,
-        tilt=tilt,
-        without_tcp_control=without_tcp_control,
-    )
+    given = {
+        "program": program,
+        "frame": frame,
+        "tool": tool,
+        "tool_z": tool_z,
+        "tool_number": tool_number,
+        "frame_number": frame_number,
+        "program_number": program_number,
+        "process_only": process_only,
+        "blend_mm": blend_mm,
+        "acceleration_m_s2": acceleration_m_s2,
+        "rotary": rotary,
+        "tilt": tilt,
+        "without_tcp_control": without_tcp_control,
+    }
+    if cell is None:
+        if not format:
+            raise ConfigError("nrdf export needs --format, or --cell\nsee nrdf export --help")
+        options = Options(**given)  # type: ignore[arg-type]
+    else:
+        for name, value in (("--tool", tool), ("--frame", frame)):
+            if value is not None:
+                raise ConfigError(f"{name} is what the cell file says; give one of the two")
+        described = read_cell(cell)
+        options = options_of_cell(described, **given)
+        format = format or tuple(described.programs.formats)
     check_formats(format)
     content = read_toolpaths(job)
-    folder_path = out or (job if job.is_dir() else job.parent) / "export"
-    with output_folder(folder_path, overwrite, [job]) as folder:
+    home = job if job.is_dir() else job.parent
+    if options.cell is not None:
+        content = place_job(options.cell, content, home)
+    folder_path = out or home / "export"
+    with output_folder(folder_path, overwrite, [job, cell]) as folder:
         files = export_job(content, format, folder, options)
-        report = {"command": command_line(), "job": str(job), "options": asdict(options)}
+        said = {name: getattr(options, name) for name in given}
+        report = {"command": command_line(), "job": str(job), "options": said}
+        if cell is not None:
+            report["cell"] = str(cell)
         write_report(folder, {**report, "formats": files})
     shown = table("", "format", "")
     for name, written in files.items():

@@ -14,6 +14,7 @@ from nrdf.io.bounds import FINITE, Count, NonNegative, Seed
 def simulate(
     job: Positional[Folder],
     out: Folder | None = None,
+    cell: File | None = None,
     robot: File | None = None,
     tool_frame: Annotated[str, Metavar("NAME")] | None = None,
     base: Annotated[tuple[str, ...], Metavar("auto|X Y Z")] = ("auto",),
@@ -38,6 +39,9 @@ def simulate(
     Args:
         job: Folder that `nrdf transfer` wrote.
         out: Folder to write; JOB/simulation unless given.
+        cell: Cell file, as `nrdf cell new` begins it: its robot, where it stands objects, its tools
+            and its keep-out boxes, instead of --robot, --tool-frame, --base, --stand, --turns and
+            --up.
         robot: URDF or MJCF file; the bundled arm unless given.
         tool_frame: Body or site of the robot that the tool is mounted on.
         base: Place of the arm's base in metres: x y z from the floor under the middle of the
@@ -54,15 +58,30 @@ def simulate(
         seed: Of the random searches.
         overwrite: Replace an earlier result in the output folder.
     """
+    from nrdf.cell.file import read_cell
+    from nrdf.errors import ConfigError
     from nrdf.io.output import output_folder
     from nrdf.robot.model.arm import load_arm
     from nrdf.robot.model.signed_distance import distance_field_from_file
     from nrdf.robot.report.folder import write_simulation
+    from nrdf.robot.simulation.described_cell import place_in_cell
     from nrdf.robot.simulation.job import read_simulation_job
+    from nrdf.robot.simulation.simulate import object_distance_field
     from nrdf.robot.simulation.simulate import simulate as run
 
+    described = None
+    if cell is not None:
+        usual = robot is tool_frame is turns is up is None and base == ("auto",) and not stand
+        if not usual:
+            raise ConfigError(
+                "the cell file says robot, tool frame, base, stand, turns and up: leave --robot, "
+                "--tool-frame, --base, --stand, --turns and --up out"
+            )
+        described = read_cell(cell)
+        model, tool_frame = described.robot.model, described.robot.tool_frame
+        robot = cell.parent / model if model else None
     out = out or (job if job.is_dir() else job.parent) / "simulation"
-    with output_folder(out, overwrite, [job, robot, mesh]) as folder:
+    with output_folder(out, overwrite, [job, cell, robot, mesh]) as folder:
         work = read_simulation_job(job, up)
         arm = load_arm(robot, tool_frame)
         for line in arm.checked:
@@ -72,6 +91,11 @@ def simulate(
         if mesh is not None:
             distance_field = distance_field_from_file(mesh, work.points)
             work = work.with_mesh(mesh)
+        if described is not None:
+            with errors.status("shape of the object"):
+                distance_field = distance_field or object_distance_field(work)
+            work, given = place_in_cell(described, work, distance_field)
+            count = 1
         with errors.status("simulation") as status:
             shift = tuple(x / 1e3 for x in shift_mm)
             done = run(work, arm, distance_field, given, count, shift, seed, status.update)

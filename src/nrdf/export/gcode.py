@@ -20,6 +20,7 @@ from nrdf.export.names import number, numbers, program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import blended_segments, prepare, tool_numbers
 from nrdf.export.rotation import rotary_angles_deg, tool_axes
+from nrdf.export.switching import Dialect, switching, switching_note
 from nrdf.toolpath.types import Job, Segment, ToolPath
 
 _SUPPORT = (
@@ -27,6 +28,7 @@ _SUPPORT = (
     "axis. Spindle, feed and dwell are."
 )
 _WIDTH = 78
+_DIALECT = Dialect("gcode", lambda signal, on: "", lambda seconds: f"G4 X{number(seconds, 3)}")
 
 
 def write(job: Job, options: Options, folder: Path) -> None:
@@ -36,7 +38,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     name = program_name(job, options, 24, "the file system")
     unit = "Lengths in mm (G21), F in mm/min (G94), G4 X in s."
-    comments = header(job, options, unit, _orientation(options), _SUPPORT, _control(options))
+    notes = f"{_control(options)} {switching_note(job.paths, options, _DIALECT)}".strip()
+    comments = header(job, options, unit, _orientation(options), _SUPPORT, notes)
     lines = ["%", f"O{options.program_number:04d} ({name.upper()})", *_comments(comments)]
     lines += ["G21 G90 G94 G17 G40 G49 G80", f"G{53 + options.frame_number}"]
     numbers_of = tool_numbers(job, options)
@@ -88,19 +91,21 @@ def _path(path: ToolPath, options: Options, tool: int) -> list[str]:
     offset = "G43" if options.without_tcp_control else "G43.4"
     lines += [f"G0 {words[0][1]}", f"{offset} H{tool}"]
     row = 0
+    switched = switching(path, options, _DIALECT)
     for index, segment in enumerate(segments, start=1):
         lines += _comments([segment_title(segment, index)])
         set_to = ""
-        for speed in segment.speeds_m_s:
-            point, angles = words[row]
-            if row == 0:
-                lines.append(f"G0 {point} {angles}")
-            else:
-                same = set_to == (set_to := number(60000 * speed, 2))
-                lines.append(f"G1 {point} {angles}" + ("" if same else f" F{set_to}"))
-            row += 1
+        moves = list(zip(words[row:], segment.speeds_m_s, strict=False))
+        if row == 0 and moves:
+            lines.append("G0 {} {}".format(*moves.pop(0)[0]))
+        lines += switched.before(index - 1)
+        for (point, angles), speed in moves:
+            same = set_to == (set_to := number(60000 * speed, 2))
+            lines.append(f"G1 {point} {angles}" + ("" if same else f" F{set_to}"))
+        row += len(segment.positions)
         if segment.dwell_s:
             lines.append(f"G4 X{number(segment.dwell_s, 3)}")
+        lines += switched.after(index - 1)
     return [*lines, "G49", *(["M5"] if path.spindle_rad_s is not None else [])]
 
 

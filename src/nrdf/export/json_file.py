@@ -11,8 +11,9 @@ from nrdf.export.header import header, save, tool_z_words
 from nrdf.export.names import program_name
 from nrdf.export.options import Options
 from nrdf.export.prepare import prepare
+from nrdf.export.switching import cell_tool
 from nrdf.toolpath.file import pose_to_dict
-from nrdf.toolpath.types import Job
+from nrdf.toolpath.types import Job, ToolPath
 
 VERSION = 1
 _SUPPORT = (
@@ -34,6 +35,15 @@ def write(job: Job, options: Options, folder: Path) -> None:
 
 def _on_one_line(found: re.Match[str]) -> str:
     return "[" + " ".join(found[1].split()) + "]"
+
+
+def _in_cell(path: ToolPath, options: Options) -> dict[str, Any]:
+    """What the cell file says of a path's tool: number, mass, what is switched while it works."""
+    tool = cell_tool(path, options)
+    if options.cell is None or tool is None:
+        return {}
+    said = tool.model_dump(mode="json", exclude={"name", "tcp_m", "tcp_quaternion_xyzw"})
+    return {"cell_tool": {**said, "number": options.cell.tool_numbers[tool.name]}}
 
 
 def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, Any]:
@@ -69,6 +79,7 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
                 "tool_radius_m": float(path.tool_radius_m),
                 "spindle_rad_s": path.spindle_rad_s,
                 "parameters": path.parameters,
+                **_in_cell(path, options),
                 **known,
                 "segments": segments,
             }

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
-from nrdf.errors import ProcessError
+from pydantic import TypeAdapter, ValidationError
+
+from nrdf.cell.work_cell import WorkCell
+from nrdf.errors import ProcessError, unknown_name
 
 ToolZ = Literal["into", "out"]
 
@@ -46,6 +49,10 @@ class Options:
     """The machine's own X Y Z instead of G43.4 (gcode); its two rotary tables meet in the origin.
     """
 
+    cell: WorkCell | None = None
+    """The cell that the job was placed in (`nrdf.cell.placement.job_in_base`): its tools are named,
+    numbered and switched."""
+
     def __post_init__(self) -> None:
         _within("tool-number", self.tool_number, 1, 16)
         _within("frame-number", self.frame_number, 1, 32)
@@ -57,3 +64,25 @@ class Options:
 def _within(name: str, value: float, lowest: float, highest: float) -> None:
     if not lowest <= value <= highest:
         raise ProcessError(f"--{name} {value}: must be from {lowest} to {highest}")
+
+
+def options_of_cell(cell: WorkCell, **given: Any) -> Options:
+    """The options of a cell file's programs; `given`, where they are not the usual ones, instead.
+
+    Raises ProcessError for an option that there is not, or a value that does not fit.
+    """
+    usual = Options()
+    for name in cell.programs.options:
+        if name not in vars(usual) or name in ("cell", "tool", "frame"):
+            names = [one for one in vars(usual) if one not in ("cell", "tool", "frame")]
+            raise ProcessError(
+                f"the cell's programs.options: {unknown_name('option', name, names)}"
+            )
+    chosen = {name: value for name, value in given.items() if value != getattr(usual, name)}
+    try:
+        made = TypeAdapter(Options).validate_python({**cell.programs.options, **chosen})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"][:1]))
+        raise ProcessError(f"the cell's programs.options: {where}: {first['msg']}") from None
+    return replace(made, cell=cell)

@@ -71,11 +71,13 @@ def _prepare_path(path: ToolPath, options: Options, tool_z: ToolZ) -> ToolPath:
     return replace(path, tool=tool, segments=tuple(segments), tcp_quaternion_xyzw=tcp)
 
 
-def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
+def blended_segments(
+    path: ToolPath, blend_m: float, stops: frozenset[int] = frozenset()
+) -> list[BlendedSegment]:
     """The segments of `path` as a controller drives them, rounding waypoints by up to `blend_m`.
 
-    A waypoint is not rounded at the path's ends, at a dwell, where the force changes, or by more
-    than 0.45 of the way to either neighbour.
+    A waypoint is not rounded at the path's ends, at a dwell, where the force changes, at the end of
+    a segment whose index is in `stops`, or by more than 0.45 of the way to either neighbour.
     """
     counts = [len(segment.positions) for segment in path.segments]
     owner = np.repeat(np.arange(len(counts)), counts)
@@ -96,7 +98,7 @@ def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
     blends[blends < _SMALLEST_BLEND_M] = 0.0
     for i, segment in enumerate(path.segments):
         after = path.segments[i + 1] if i + 1 < len(path.segments) else None
-        if segment.dwell_s or not after or after.force_n != segment.force_n:
+        if i in stops or segment.dwell_s or not after or after.force_n != segment.force_n:
             blends[np.flatnonzero(owner <= i)[-1]] = 0.0
     made = []
     for i, segment in enumerate(path.segments):
@@ -112,4 +114,8 @@ def blended_segments(path: ToolPath, blend_m: float) -> list[BlendedSegment]:
 def tool_numbers(job: Job, options: Options) -> dict[str, int]:
     """Number of each tool, in the order in which they are first used."""
     names = dict.fromkeys(path.tool for path in job.paths)
+    if options.cell is not None:
+        numbers = options.cell.tool_numbers
+        if set(names) <= set(numbers):
+            return {name: numbers[name] for name in names}
     return {name: options.tool_number + i for i, name in enumerate(names)}

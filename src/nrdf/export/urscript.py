@@ -18,6 +18,7 @@ from nrdf.export.names import number, numbers, plain_text, program_name, routine
 from nrdf.export.options import Options
 from nrdf.export.prepare import BlendedSegment, blended_segments, prepare
 from nrdf.export.rotation import rotation_vectors
+from nrdf.export.switching import Dialect, cell_tool, switching, switching_note
 from nrdf.toolpath.types import Job, ToolPath
 
 _WORDS = (
@@ -29,10 +30,24 @@ _SUPPORT = (
     "Contact force is carried: force_mode, compliant along tool z alone, from the first waypoint "
     "with force to the last. Spindle speed is not: switch it where a path begins. Dwell is."
 )
+_SUPPORT_IN_CELL = (
+    "Contact force is carried: force_mode, compliant along tool z alone, from the first waypoint "
+    "with force to the last. Dwell is. Spindle and gun are switched as the cell file says."
+)
 _NOTES = (
     "Set before use: nrdf_frame, the pose of the frame in the robot's base; TCP, payload and "
     "centre of gravity of the first tool in the installation, of others where the program stops "
     "for them. zero_ftsensor needs an e-Series or newer."
+)
+_NOTES_IN_CELL = (
+    "Positions are in the robot's base: nothing to set but the speed of the joint moves. TCPs are "
+    "set by the program, payloads where the cell file knows the mass. zero_ftsensor needs an "
+    "e-Series or newer."
+)
+_DIALECT = Dialect(
+    "urscript",
+    lambda signal, on: f"set_standard_digital_out({signal}, {on})",
+    lambda seconds: f"sleep({number(seconds, 3)})",
 )
 _JOINT_SPEED = "a=0.5, v=0.3"
 
@@ -42,7 +57,10 @@ def write(job: Job, options: Options, folder: Path) -> None:
     job = prepare(job, options, "into")
     name = program_name(job, options, 32, "URScript", _WORDS)
     orientation = f"rotation vector rx ry rz in rad; {tool_z_words(options, 'into')}."
-    comments = header(job, options, "Lengths in m, speeds in m/s.", orientation, _SUPPORT, _NOTES)
+    in_cell = options.cell is not None
+    support, notes = (_SUPPORT_IN_CELL, _NOTES_IN_CELL) if in_cell else (_SUPPORT, _NOTES)
+    notes = f"{notes} {switching_note(job.paths, options, _DIALECT)}".strip()
+    comments = header(job, options, "Lengths in m, speeds in m/s.", orientation, support, notes)
     procedures = routine_names(job, 32)
     lines = [*commented(comments, "# "), f"def {name}():", *_shared()]
     mounted = job.paths[0].tool
@@ -51,7 +69,7 @@ def write(job: Job, options: Options, folder: Path) -> None:
         if path.tool != mounted:
             lines += _change_tool(path)
             mounted = path.tool
-        lines += _set_tcp(path)
+        lines += _set_tcp(path) + _set_payload(path, options)
         lines += [f"    {line}" for line in _path(path, options)] + ["  end"]
     save(folder / f"{name}.script", [*lines, *(f"  {p}()" for p in procedures), "end"])
 
@@ -76,7 +94,7 @@ def _change_tool(path: ToolPath) -> list[str]:
     name = plain_text(path.tool)
     if path.tcp_m is not None:
         return [
-            f"    # Set the payload of {name} here: set_payload(...)",
+            f"    # Unless it is set below, set the payload of {name} here: set_payload(...)",
             f'    popup("{name}: is it mounted?", title="nrdf", blocking=True)',
         ]
     return [
@@ -94,12 +112,23 @@ def _set_tcp(path: ToolPath) -> list[str]:
     return [f"    set_tcp(p[{values}])"]
 
 
+def _set_payload(path: ToolPath, options: Options) -> list[str]:
+    """Mass and centre of mass, where the cell knows them."""
+    tool = cell_tool(path, options)
+    if tool is None or tool.mass_kg is None:
+        return []
+    centre = ", ".join(numbers(tool.centre_of_mass_m or (0.0, 0.0, 0.0), 5))
+    return [f"    set_target_payload({number(tool.mass_kg, 4)}, [{centre}])"]
+
+
 def _path(path: ToolPath, options: Options) -> list[str]:
     into = -1.0 if options.tool_z == "out" else 1.0
     lines: list[str] = []
     force: float | None = None
     arriving = True
-    for i, blended in enumerate(blended_segments(path, options.blend_mm / 1000), start=1):
+    switched = switching(path, options, _DIALECT)
+    every = blended_segments(path, options.blend_mm / 1000, switched.stops)
+    for i, blended in enumerate(every, start=1):
         segment = blended.segment
         lines += commented([segment_title(segment, i)], "# ")
         moves = _moves(blended, options.acceleration_m_s2)
@@ -110,6 +139,7 @@ def _path(path: ToolPath, options: Options) -> list[str]:
                 # Still in the air: what the sensor feels now is the tool's own weight.
                 lines += ["sleep(0.2)", "zero_ftsensor()"]
             arriving = False
+        lines += switched.before(i - 1)
         if segment.force_n != force:
             lines += _release() if force is not None else []
             lines += _press(into * segment.force_n) if segment.force_n is not None else []
@@ -117,6 +147,7 @@ def _path(path: ToolPath, options: Options) -> list[str]:
         lines += [f"movel({pose}, {how})" for pose, how in moves]
         if segment.dwell_s:
             lines.append(f"sleep({number(segment.dwell_s, 3)})")
+        lines += switched.after(i - 1)
     return lines + (_release() if force is not None else [])
 
 

@@ -32,6 +32,11 @@ def to_yaml(knowledge: Knowledge, explained: bool) -> str:
     return HEADER + EXPLANATION * explained + "\n".join(lines) + "\n"
 
 
+def model_lines(model: BaseModel, explained: bool) -> list[str]:
+    """The YAML lines of a model's fields; `explained` as `to_yaml` has it."""
+    return list(_Lines(explained).of(model, ""))
+
+
 class _Lines:
     """Writes YAML line by line; explains the fields of each model where it first occurs."""
 

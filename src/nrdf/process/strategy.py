@@ -75,4 +75,5 @@ def tool_path(region: str, process: Process, segments: Sequence[Segment]) -> Too
         tcp_quaternion_xyzw=process.tool.tcp_quaternion_xyzw,
         force_tolerance_n=process.force_tolerance_n,
         strategy=strategy_of(process),
+        process_kind=process.kind,
     )

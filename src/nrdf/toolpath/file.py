@@ -37,7 +37,7 @@ from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 VERSION = 5
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
 strategy; since 4 that has the settings of modifiers; since 5 waypoints may have feeds of their own,
-and a strategy has an origin and resampling."""
+a strategy has an origin and resampling, and a path the kind of its process."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -243,6 +243,7 @@ class _PathContent(StrictModel):
     tcp_quaternion_xyzw: _Quaternion | None = None
     force_tolerance_n: _AboveZero | None = None
     strategy: _StrategyContent | None = None
+    process_kind: _Name | None = None
 
     def made(self, where: str) -> ToolPath:
         content = {name: getattr(self, name) for name in type(self).model_fields}

@@ -97,6 +97,7 @@ class ToolPath:
     force_tolerance_n: how far the contact force may be off.
     strategy: the planner's settings that the path was made with, its direction in the job's frame;
     None for a path from a file of version 1 or 2.
+    process_kind: what kind of process it is ("sand", "paint", ...); None in files before version 5.
     """
 
     region: str
@@ -110,6 +111,7 @@ class ToolPath:
     tcp_quaternion_xyzw: tuple[float, float, float, float] | None = None
     force_tolerance_n: float | None = None
     strategy: Strategy | None = None
+    process_kind: str | None = None
 
     @property
     def groups(self) -> tuple[SegmentGroup, ...]:

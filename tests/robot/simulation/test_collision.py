@@ -36,7 +36,7 @@ def test_clearances_tell_object_floor_and_arm_apart(plate):
     cell = plate.paths[0].cell
     joints = np.concatenate([log.joints[-1:] for log in plate.paths[0].logs])
     found = clearances(cell, joints, np.zeros(len(joints), int))
-    assert set(found) == {"object", "floor", "itself"}
+    assert set(found) == {"object", "floor", "keep-out box", "itself"}
     both = np.minimum(found["object"], found["floor"])
     least = cell.clearance(cell.chain.frames(joints), np.zeros(len(joints), int)).least
     np.testing.assert_allclose(both, least)

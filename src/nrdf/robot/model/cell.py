@@ -20,6 +20,29 @@ _ALWAYS = 0.3  # share of random configurations in which two links touch, to be 
 
 
 @dataclass(frozen=True)
+class Box:
+    """A box in the frame of the arm's base. T_base_box: (4, 4); half_m: (3,) half its lengths."""
+
+    name: str
+    T_base_box: np.ndarray
+    half_m: np.ndarray
+
+    def distances(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Signed distances (...,) of points (..., 3), positive outside, and directions (..., 3)
+        away from the box."""
+        rotation = self.T_base_box[:3, :3]
+        local = (points - self.T_base_box[:3, 3]) @ rotation
+        over = np.abs(local) - self.half_m
+        outside = np.maximum(over, 0.0)
+        far = np.linalg.norm(outside, axis=-1)
+        deepest = over.max(axis=-1)
+        # Inside, the nearest face's direction; outside, that from the nearest point of the box.
+        face = np.eye(3)[over.argmax(axis=-1)]
+        away = np.where((far > 0)[..., None], outside / np.maximum(far, 1e-12)[..., None], face)
+        return np.where(far > 0, far, deepest), (np.sign(local) * away) @ rotation.T
+
+
+@dataclass(frozen=True)
 class Placement:
     """Where the arm's base and the object stand.
 
@@ -28,13 +51,15 @@ class Placement:
 
     base_m: (3,) of the arm's base; base_yaw_rad: about z, from the cell's x to the base's x;
     stand_m: height of the object's lowest point above the floor; turntable_rad: (k,) angles that
-    the turntable may stop at. A *turntable index* is an index into them.
+    the turntable may stop at. A *turntable index* is an index into them. keep_out: what neither arm
+    nor tool may enter.
     """
 
     base_m: tuple[float, float, float]
     base_yaw_rad: float
     stand_m: float
     turntable_rad: tuple[float, ...]
+    keep_out: tuple[Box, ...] = ()
 
     def T_cell_base(self) -> np.ndarray:
         """Pose (4, 4) of the arm's base."""
@@ -98,6 +123,7 @@ class Cell:
     floor_m: float
     pairs: np.ndarray
     turntable_rad: tuple[float, ...]
+    keep_out: tuple[Box, ...] = ()
 
     @staticmethod
     def build(
@@ -122,6 +148,7 @@ class Cell:
             floor_m=-placement.base_m[2],
             pairs=_pairs(arm.chain, coarse),
             turntable_rad=placement.turntable_rad,
+            keep_out=placement.keep_out,
         )
 
     def with_placement(self, placement: Placement, upright: np.ndarray) -> Cell:
@@ -156,7 +183,7 @@ class Cell:
         return placed, np.einsum("bij,bj->bi", pose[:, :3, :3], vectors)
 
     def clearance(self, frames: Frames, turntable_index: np.ndarray) -> Clearance:
-        """Distance between arm or tool and object or floor, for configurations (b,).
+        """Distance between arm or tool and object, floor or boxes, for configurations (b,).
 
         turntable_index: (b,)."""
         centres = self.spheres.at(frames.rotations, frames.positions)
@@ -175,7 +202,18 @@ class Cell:
         gradient = np.einsum("bij,bj->bi", pose[:, :3, :3], gradients[row, nearest])
         gradient = np.where(on_floor[:, None], [0.0, 0.0, 1.0], gradient)
         least = np.where(on_floor, height, closest)
-        return Clearance(least, sphere, centres[row, sphere], gradient, on_floor)
+        in_box = np.zeros(len(least), bool)
+        for box in self.keep_out:
+            far, away_from_box = box.distances(centres)
+            # The base may stand on, or in, what is kept free.
+            far = np.where(self.spheres.links == 0, np.inf, far - self.spheres.radii)
+            number = far.argmin(axis=1)
+            nearer = far[row, number] < least
+            least = np.where(nearer, far[row, number], least)
+            sphere = np.where(nearer, number, sphere)
+            gradient = np.where(nearer[:, None], away_from_box[row, number], gradient)
+            on_floor, in_box = on_floor & ~nearer, in_box | nearer
+        return Clearance(least, sphere, centres[row, sphere], gradient, on_floor, in_box)
 
     def self_clearance(self, frames: Frames) -> np.ndarray:
         """Least distance (b,) between parts of arm and tool that are not neighbours."""
@@ -196,13 +234,15 @@ class Cell:
 @dataclass(frozen=True)
 class Clearance:
     """least: (b,), m, negative where something is hit; sphere: (b,) that is nearest, point: (b, 3)
-    its centre, gradient: (b, 3) the direction away; floor: (b,) whether it is the floor."""
+    its centre, gradient: (b, 3) the direction away; floor, keep_out: (b,) whether it is the floor,
+    or a keep-out box."""
 
     least: np.ndarray
     sphere: np.ndarray
     point: np.ndarray
     gradient: np.ndarray
     floor: np.ndarray
+    keep_out: np.ndarray
 
 
 def _column(floor: float) -> Spheres:

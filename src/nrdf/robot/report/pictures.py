@@ -224,6 +224,11 @@ def _build(
             type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[0.09, 0.0, 0.0],
             fromto=[0.0, 0.0, cell.floor_m, 0.0, 0.0, 0.0], rgba=[0.45, 0.47, 0.5, 1.0],
         )  # fmt: skip
+    for box in cell.keep_out:
+        world.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX, size=box.half_m, pos=box.T_base_box[:3, 3],
+            quat=quaternions_wxyz(box.T_base_box[:3, :3]), rgba=[0.85, 0.45, 0.25, 0.35],
+        )  # fmt: skip
     body = world.add_body(name="nrdf_object", mocap=True)
     for number, (vertices, faces, colour) in enumerate(parts):
         name = f"nrdf_part_{number}"

@@ -17,8 +17,9 @@ _BATCH = 4000
 
 @dataclass(frozen=True)
 class Collision:
-    """Contact during one action. what: "object", "floor" or "itself"; depth_m: how deep, at most,
-    the spheres that enclose the arm's shapes are in it; kind, line: of the action."""
+    """Contact during one action. what: "object", "floor", "keep-out box" or "itself"; depth_m: how
+    deep, at most, the spheres that enclose the arm's shapes are in it; kind, line: of the action.
+    """
 
     region: str
     kind: str
@@ -58,16 +59,19 @@ def find_collisions(
 
 
 def clearances(cell: Cell, joints: np.ndarray, index: np.ndarray) -> dict[str, np.ndarray]:
-    """Distances (t,), m, of joints (t, n) from the object, the floor and the arm itself.
+    """Distances (t,), m, of joints (t, n) from object, floor, keep-out boxes and the arm itself.
 
     index: (t,) of the turntable.
     """
-    parts: dict[str, list[np.ndarray]] = {"object": [], "floor": [], "itself": []}
+    names = ("object", "floor", "keep-out box", "itself")
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for start in range(0, len(joints), _BATCH):
         frames = cell.chain.frames(joints[start : start + _BATCH])
         near = cell.clearance(frames, index[start : start + _BATCH])
         far = np.full(len(frames.tcp), np.inf)
-        parts["object"].append(np.where(near.floor, far, near.least))
+        other = near.floor | near.keep_out
+        parts["object"].append(np.where(other, far, near.least))
         parts["floor"].append(np.where(near.floor, near.least, far))
+        parts["keep-out box"].append(np.where(near.keep_out, near.least, far))
         parts["itself"].append(cell.self_clearance(frames))
     return {name: np.concatenate(values) for name, values in parts.items()}

@@ -90,7 +90,7 @@ def simulate(
     surfaces = simulation_job.surfaces
     progress("shape of the object")
     if distance_field is None:
-        distance_field = _distance_field(simulation_job)
+        distance_field = object_distance_field(simulation_job)
     clock("shape")
     progress("placement")
     upright, paths = simulation_job.upright, simulation_job.job.paths
@@ -141,7 +141,8 @@ def simulate(
     )  # fmt: skip
 
 
-def _distance_field(simulation_job: SimulationJob) -> SignedDistanceField:
+def object_distance_field(simulation_job: SimulationJob) -> SignedDistanceField:
+    """The shape of a job's object, from its surface."""
     surfaces = simulation_job.surfaces
     if surfaces.exact:
         mesh = surfaces.given

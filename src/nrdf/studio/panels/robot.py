@@ -18,7 +18,12 @@ _MEANINGS = {
     "collision": "the arm or the tool would collide, there or on every way there",
     "too fast": "the joints allow less than half of the feed",
 }
-_OBSTACLES = {"object": "the object", "floor": "the floor", "itself": "the arm itself"}
+_OBSTACLES = {
+    "object": "the object",
+    "floor": "the floor",
+    "keep-out box": "a box",
+    "itself": "the arm itself",
+}
 _MOTIONS = {
     "transition": "transition", "approach": "approach", "process": "process", "retract": "retract",
     "turntable": "turntable",
