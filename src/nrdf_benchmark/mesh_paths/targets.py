@@ -39,7 +39,7 @@ CARS, PLANES = "car", "plane"
 """Names of folders of cars and aircraft: +X forward, +Y up."""
 SAMPLES = 60_000  # points of the outer skin that figures are measured at
 LEAST_POINTS = 30  # of a region
-_WING_EDGE = 0.02  # of an aircraft's longest side
+_EDGE = 0.01  # of a car's or an aircraft's longest side
 _SUFFIXES = (".ply", ".stl", ".obj", ".off", ".glb")
 
 
@@ -154,8 +154,7 @@ def whole_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: s
 
 def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
     """A car with bonnet, roof and right door, told by the place and normal of the faces."""
-    vertices = _scaled(vertices, 1.0)
-    faces = _outward(vertices, faces)
+    vertices, faces = _divided(vertices, faces)
     centre = vertices[faces].mean(axis=1)
     cross = triangle_crosses(vertices, faces)
     normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
@@ -175,14 +174,8 @@ def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str
 
 
 def plane_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
-    """An aircraft with the upper side of its right wing, told by the place and normal of faces.
-
-    Wings are modelled in triangles as long as they are: divided, so that the region has a straight
-    border at the body.
-    """
-    vertices, faces = remesh.subdivide_to_size(_scaled(vertices, 1.0), faces, _WING_EDGE)
-    vertices, faces, _ = clean_faces(vertices, faces)
-    faces = _outward(vertices, faces)
+    """An aircraft with the upper side of its right wing, told by the place and normal of faces."""
+    vertices, faces = _divided(vertices, faces)
     centre = vertices[faces].mean(axis=1)
     cross = triangle_crosses(vertices, faces)
     normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
@@ -209,6 +202,16 @@ def _largest(faces: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """The connected piece (f,) with most faces."""
     piece = face_components(faces, mask)
     return np.asarray(piece == np.bincount(piece[mask]).argmax())
+
+
+def _divided(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh of size 1 in triangles so small that a region of whole ones has an even border.
+
+    Doors and wings are modelled in triangles as long as they are; the surface stays as it is.
+    """
+    vertices, faces = remesh.subdivide_to_size(_scaled(vertices, 1.0), faces, _EDGE)
+    vertices, faces, _ = clean_faces(vertices, faces)
+    return vertices, _outward(vertices, faces)
 
 
 def _scaled(vertices: np.ndarray, size_m: float) -> np.ndarray:
