@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from builders.export_checks import (
     HALF_TURN_ABOUT_X,
     compare,
@@ -44,3 +48,13 @@ def test_a_touch_without_a_move_still_presses_and_waits(tmp_path):
         ("krl/nrdf_chair.src", "WAIT SEC"),
     ):
         assert wait in (tmp_path / kind).read_text()
+
+
+def test_force_ends_where_a_stroke_runs_off_the_part_and_begins_again_where_it_is_back(tmp_path):
+    over = np.array([True, True, False, False, True, True])
+    stroke = replace(straight("process", 0, 10, 20, 30, 40, 50, force=7.0), on_surface=over)
+    job = job_of(path_of(straight("approach", -20, 0), stroke, straight("retract", 50, 90)))
+    (reads,) = read_urscript(written(job, "urscript", tmp_path))
+    pressed = [round(1000 * read.position[0]) for read in reads if read.force_n is not None]
+    assert pressed == [10, 50]
+    assert "process off the surface" in written(job, "urscript", tmp_path / "b").read_text()

@@ -13,6 +13,7 @@ from nrdf.errors import ProcessError
 from nrdf.surface.given_surface import MeshSurface
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
+from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.metrics import measure_path
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.tool_segments import add_approach_retract
@@ -227,3 +228,14 @@ def test_a_path_that_only_moves_freely_is_refused():
     free = [segment for segment in lines(0.1) if segment.kind != "process"]
     with pytest.raises(ProcessError, match="without a process segment"):
         measure_path(BOARD, STRATEGY, free)
+
+
+def test_what_runs_off_within_a_stroke_is_no_work_beside_the_surface():
+    strategy = replace(STRATEGY, run_off_m=0.06)
+    given = MeshSurface(BOARD.mesh.vertices, BOARD.mesh.faces)
+    segments = plan_on_mesh(BOARD, strategy)
+    (work,) = [s for s in segments if s.kind == "process"]
+    found = measure_path(BOARD, strategy, segments, given)
+    assert found.true_distance_worst_m < 1e-9 and found.surface_distance_worst_m < 1e-9
+    silent = [replace(s, on_surface=None) if s is work else s for s in segments]
+    assert measure_path(BOARD, strategy, silent, given).true_distance_worst_m > 0.05

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from nrdf.geometry.similarity import Similarity
-from nrdf.toolpath.types import Job, Segment, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath, split_at_edges
 
 
 def segment(kind, line=0, count=3):
@@ -53,3 +53,19 @@ def test_up_and_forward_are_the_pose_s_axes():
     job = Job("chair", "cell", (), Similarity(turn, np.zeros(3), 1.0))
     assert job.up.tolist() == turn[:, 1].tolist()
     assert job.forward.tolist() == turn[:, 0].tolist()
+
+
+def test_a_stroke_that_leaves_the_surface_is_split_where_it_does_and_has_no_force_there():
+    over = np.array([False, True, True, False, False, True])
+    line = replace(segment("process", count=6), force_n=9.0, dwell_s=2.0, on_surface=over)
+    parts = split_at_edges(line)
+    assert [p.force_n for p in parts] == [None, 9.0, None, 9.0]
+    assert [len(p.positions) for p in parts] == [2, 2, 3, 1]
+    assert [p.dwell_s for p in parts] == [0.0, 0.0, 0.0, 2.0]
+    # Force begins where the tool is back on the surface, and ends where it leaves it.
+    assert parts[0].positions[-1].tolist() == parts[1].positions[0].tolist()
+    assert parts[1].positions[-1].tolist() == line.positions[2].tolist()
+    assert [p.over_surface.any() for p in parts] == [False, True, False, True]
+    for whole in (segment("process"), segment("approach")):
+        assert split_at_edges(whole) == [whole]
+    assert segment("process").over_surface.all() and not segment("approach").over_surface.any()

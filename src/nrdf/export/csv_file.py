@@ -15,11 +15,12 @@ from nrdf.toolpath.types import Job
 
 COLUMNS = (
     *("path", "region", "process", "tool", "tool_radius_m", "spindle_rad_s"),
-    *("segment", "kind", "line", "feed_m_s", "force_n", "dwell_s"),
+    *("segment", "kind", "on_surface", "line", "feed_m_s", "force_n", "dwell_s"),
     *("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"),
 )
 _SUPPORT = (
     "Empty force_n: no contact. Empty spindle_rad_s: nothing turns. dwell_s: after the waypoint. "
+    "A process segment with on_surface 0 is beyond the part's edge, the tool still on. "
     "Free parameters are not carried."
 )
 
@@ -38,7 +39,8 @@ def write(job: Job, options: Options, folder: Path) -> None:
         names = [spreadsheet_text(plain_text(text)) for text in texts]
         whole = [i, *names, float(path.tool_radius_m), path.spindle_rad_s]
         for k, segment in enumerate(path.segments, start=1):
-            about, feeds = [k, segment.kind, segment.line], segment.speeds_m_s.tolist()
+            over = int(segment.over_surface.all())
+            about, feeds = [k, segment.kind, over, segment.line], segment.speeds_m_s.tolist()
             for n, position in enumerate(segment.positions, start=1):
                 dwell = segment.dwell_s if n == len(segment.positions) else 0.0
                 pose = [*position.tolist(), *segment.quaternions_xyzw[n - 1].tolist()]

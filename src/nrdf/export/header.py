@@ -84,11 +84,14 @@ def _describe(path: ToolPath) -> str:
 def segment_title(segment: Segment, index: int) -> str:
     """Kind, line, speed and force of a segment."""
     force = "no contact force" if segment.force_n is None else f"force {segment.force_n:.3f} N"
+    kind: str = segment.kind
+    if segment.on_surface is not None and not segment.on_surface.any():
+        kind += " off the surface"
     feed = f"{1000 * segment.feed_m_s:.3f} mm/s"
     if segment.feeds_m_s is not None:
         least, most = 1000 * segment.feeds_m_s.min(), 1000 * segment.feeds_m_s.max()
         feed = f"{least:.3f} to {most:.3f} mm/s"
-    return f"Segment {index}: {segment.kind}, line {segment.line}, {feed}, {force}"
+    return f"Segment {index}: {kind}, line {segment.line}, {feed}, {force}"
 
 
 def revolutions_per_minute(rad_s: float) -> float:

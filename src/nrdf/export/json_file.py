@@ -18,7 +18,7 @@ from nrdf.toolpath.types import Job, ToolPath
 VERSION = 1
 _SUPPORT = (
     "force_n null: no contact. spindle_rad_s null: nothing turns. dwell_s: after the segment's "
-    "last waypoint."
+    "last waypoint. on_surface false: beyond the part's edge, the tool still on."
 )
 WAYPOINT = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 
@@ -55,10 +55,12 @@ def describe(job: Job, options: Options, waypoints: bool = True) -> dict[str, An
         segments = []
         for segment in path.segments:
             feeds = segment.feeds_m_s
+            over = {} if segment.on_surface is None else {"on_surface": False}
             poses = zip(segment.positions, segment.quaternions_xyzw, strict=True)
             segments.append(
                 {
                     "kind": segment.kind,
+                    **over,
                     "line": segment.line,
                     "feed_m_s": float(segment.feed_m_s),
                     **({} if feeds is None else {"feeds_m_s": feeds.tolist()}),

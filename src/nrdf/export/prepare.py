@@ -10,7 +10,7 @@ from nrdf.errors import ProcessError
 from nrdf.export.options import Options, ToolZ
 from nrdf.export.rotation import tool_z_out
 from nrdf.geometry.polylines import step_lengths
-from nrdf.toolpath.types import Job, Segment, ToolPath
+from nrdf.toolpath.types import Job, Segment, ToolPath, split_at_edges
 
 _FARTHEST_M = 100.0
 _SMALLEST_BLEND_M = 1e-4
@@ -51,7 +51,7 @@ def prepare(job: Job, options: Options, tool_z: ToolZ) -> Job:
 
 def _prepare_path(path: ToolPath, options: Options, tool_z: ToolZ) -> ToolPath:
     segments = []
-    for segment in path.segments:
+    for segment in (part for whole in path.segments for part in split_at_edges(whole)):
         if len(segment.positions) == 0 or (options.process_only and segment.kind != "process"):
             continue
         farthest = float(np.abs(segment.positions).max())

@@ -36,8 +36,9 @@ from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
 VERSION = 5
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
-strategy; since 4 that has the settings of modifiers; since 5 waypoints may have feeds of their own,
-a strategy has an origin and resampling, and a path the kind of its process."""
+strategy; since 4 that has the settings of modifiers; since 5 waypoints may have feeds of their own
+and be off the surface, a strategy has an origin and resampling, and a path the kind of its
+process."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -157,6 +158,7 @@ class _SegmentContent(StrictModel):
     force_n: _AtLeastZero | None = None
     dwell_s: _AtLeastZero = 0.0
     feeds_m_s: list[_AboveZero] | None = None
+    on_surface: list[bool] | None = None
 
     def made(self, where: str) -> Segment:
         if len(self.positions_m) != len(self.quaternions_xyzw):
@@ -172,8 +174,15 @@ class _SegmentContent(StrictModel):
         content = {name: getattr(self, name) for name in type(self).model_fields}
         positions = np.array(content.pop("positions_m"), dtype=np.float64)
         content["quaternions_xyzw"] = np.array(content["quaternions_xyzw"], dtype=np.float64)
+        if self.on_surface is not None and len(self.on_surface) != len(self.positions_m):
+            raise ProcessError(
+                f"{where} has {len(self.positions_m)} positions_m, but {len(self.on_surface)} "
+                "on_surface; each position needs one, or leave them out"
+            )
         if self.feeds_m_s is not None:
             content["feeds_m_s"] = np.array(self.feeds_m_s, dtype=np.float64)
+        if self.on_surface is not None:
+            content["on_surface"] = np.array(self.on_surface, dtype=bool)
         return Segment(positions=positions, **content)
 
 

@@ -41,6 +41,7 @@ from nrdf.toolpath.tool_segments import (
     contact_points,
     fewer_waypoints,
     steady_tool_segments,
+    with_edges,
 )
 from nrdf.toolpath.types import Segment
 
@@ -76,6 +77,8 @@ def plan_on_mesh(
     ]
     lines, normals = steady_tool_segments([path for once in passes for path in once], strategy)
     lines = edge_contact(lines, strategy.edge_contact_m, strategy.lead_rad, strategy.tilt_rad)
+    if strategy.run_off_m > 0.0:
+        lines = with_edges(lines, strategy, region.parent)
     if strategy.resample_step_m > 0.0:
         lines, normals = fewer_waypoints(lines, normals, strategy)
     if strategy.constant_speed:

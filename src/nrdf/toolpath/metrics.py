@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import angles_between
-from nrdf.geometry.polylines import arc_length, step_lengths, total_length
+from nrdf.geometry.polylines import step_lengths, total_length
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.cycle_time import estimate_cycle_time
@@ -39,7 +40,8 @@ class ToolPathMetrics:
     stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on the
     surface that are worked, along the lines and between waypoints too, from the object as it was
     given (`nrdf.surface.given_surface`), which compared_with names; distances below resolution_m
-    mean nothing. None where it is not known. What runs off beyond a line's ends is in neither.
+    mean nothing. None where it is not known. Waypoints off the surface, as of a run-off, are in
+    neither.
 
     axis_error_99_rad: 99th percentile of the angle between the tool's axis and the one asked for.
     step_worst_m, turn_worst_rad, bend_worst_rad_m: the largest step between neighbouring waypoints
@@ -125,12 +127,10 @@ def measure_path(
     )
     if given is None:
         return made
-    inner = [_without_run_off(line, strategy.run_off_m) for line in contacts[:once]]
+    runs = [(k, run) for k in range(once) for run in _on_surface(work[k])]
     fine = SampledPath.along(
-        [line[own] for line, own in zip(contacts, inner, strict=False)],
-        [axis[own] for axis, own in zip(axes, inner, strict=False)],
-        _COMPARED_M, 0.0,
-    )  # fmt: skip
+        [contacts[k][run] for k, run in runs], [axes[k][run] for k, run in runs], _COMPARED_M, 0.0
+    )
     away = given.distance(fine.places, fine.axes)
     return replace(
         made,
@@ -160,13 +160,12 @@ def _jumps(
     return step, turn, bend
 
 
-def _without_run_off(contacts: np.ndarray, run_off_m: float) -> slice:
-    """The part of a line (n, 3) that is not beyond the region's border by design."""
-    if run_off_m <= 0.0:
-        return slice(None)
-    along = arc_length(contacts)
-    inner = np.flatnonzero((along > run_off_m) & (along < along[-1] - run_off_m))
-    return slice(inner[0], inner[-1] + 1) if len(inner) > 1 else slice(None)
+def _on_surface(segment: Segment) -> list[slice]:
+    """The stretches of a process segment that are on the surface; all of it where none is."""
+    over = segment.over_surface
+    cuts = [0, *(np.flatnonzero(np.diff(over.astype(int))) + 1), len(over)]
+    runs = [slice(a, b) for a, b in pairwise(cuts) if over[a]]
+    return runs or [slice(None)]
 
 
 def _fit(
@@ -178,11 +177,9 @@ def _fit(
     """Of every waypoint, the distance (n,), m, from the mesh that faces the tool, and the angle
     (n,), rad, between tool z and what the strategy asks for on smooth normals."""
     tilt = tilt_rotation(strategy.lead_rad, strategy.tilt_rad)
-    inner = [_without_run_off(line, strategy.run_off_m) for line in contacts]
-    lines = [line[own] for line, own in zip(contacts, inner, strict=True)]
-    held = Rotation.from_quat(
-        np.concatenate([s.quaternions_xyzw[own] for s, own in zip(work, inner, strict=True)])
-    )
+    runs = [(k, run) for k, segment in enumerate(work) for run in _on_surface(segment)]
+    lines = [contacts[k][run] for k, run in runs]
+    held = Rotation.from_quat(np.concatenate([work[k].quaternions_xyzw[run] for k, run in runs]))
     tails = -(held * tilt.inv()).as_matrix()[:, :, 2]
     nearest = region.parent.nearest(np.concatenate(lines), tails)
     smooth = region.parent.smooth_normals(nearest.points, nearest.faces, strategy.tool_radius_m)

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from nrdf.geometry.frames import angles_between, without_sign_jumps
 from nrdf.geometry.polylines import step_lengths
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.frames import surface_frames, tilt_rotation, travel_directions
 from nrdf.toolpath.modifiers.approach_retract import FreeMove, approach_retract
 from nrdf.toolpath.modifiers.offset import edge_offset
@@ -21,6 +22,8 @@ from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 from nrdf.toolpath.types import Segment
 
+_ON_SURFACE_M = 1e-3
+_NEVER = 1e3  # rad: more than any limit
 _SMOOTH = 0.5  # stepovers over which the travel is averaged, to either side
 
 
@@ -70,6 +73,17 @@ def steady_tool_segments(
     return segments, normals
 
 
+def with_edges(lines: Sequence[Segment], strategy: Strategy, surface: TargetMesh) -> list[Segment]:
+    """Process segments that say where they are off a surface: beyond its edges, or risen from it,
+    by more than a faceted mesh would be from a smooth one."""
+    marked = []
+    for line in lines:
+        away = surface.nearest(contact_points(line, strategy), -line.axes).distances
+        over = away <= _ON_SURFACE_M
+        marked.append(line if over.all() else replace(line, on_surface=over))
+    return marked
+
+
 def fewer_waypoints(
     lines: Sequence[Segment], normals: Sequence[np.ndarray], strategy: Strategy
 ) -> tuple[list[Segment], list[np.ndarray]]:
@@ -79,14 +93,20 @@ def fewer_waypoints(
     thin, under = [], []
     for line, outward in zip(lines, normals, strict=True):
         held = Rotation.from_quat(line.quaternions_xyzw)
-        turned = np.append(0.0, np.cumsum((held[:-1].inv() * held[1:]).magnitude()))
+        turns_at = (held[:-1].inv() * held[1:]).magnitude()
+        # An edge that the tool runs off is no straight way.
+        turns_at = turns_at + _NEVER * (np.diff(line.over_surface.astype(int)) != 0)
+        turned = np.append(0.0, np.cumsum(turns_at))
         kept = kept_waypoints(
             contact_points(line, strategy), turned, strategy.chord_error_m,
             strategy.resample_turn_rad, strategy.resample_step_m,
         )  # fmt: skip
         thin.append(
             replace(
-                line, positions=line.positions[kept], quaternions_xyzw=line.quaternions_xyzw[kept]
+                line,
+                positions=line.positions[kept],
+                quaternions_xyzw=line.quaternions_xyzw[kept],
+                on_surface=None if line.on_surface is None else line.on_surface[kept],
             )
         )
         under.append(outward[kept])
@@ -112,9 +132,9 @@ def add_approach_retract(
             if index % 2:
                 line, outward = _backwards(line, outward, strategy), outward[::-1]
             driven.append(
-                Segment(
-                    "process", len(driven), line.positions, line.quaternions_xyzw, line.feed_m_s,
-                    strategy.force_n, strategy.dwell_s,
+                replace(
+                    line, kind="process", line=len(driven), force_n=strategy.force_n,
+                    dwell_s=strategy.dwell_s,
                 )
             )  # fmt: skip
             under.append(outward)
@@ -157,7 +177,15 @@ def _backwards(line: Segment, normals: np.ndarray, strategy: Strategy) -> Segmen
     if strategy.heading == "travel":
         half = Rotation.from_rotvec(np.pi * normals[::-1])
         quaternions = without_sign_jumps((half * Rotation.from_quat(quaternions)).as_quat())
-    return replace(line, positions=line.positions[::-1], quaternions_xyzw=quaternions)
+    feeds, over = line.feeds_m_s, line.on_surface
+    return replace(
+        line,
+        positions=line.positions[::-1],
+        quaternions_xyzw=quaternions,
+        # A feed is that of the way to its waypoint.
+        feeds_m_s=None if feeds is None else np.append(feeds[-1:], feeds[:0:-1]),
+        on_surface=None if over is None else over[::-1],
+    )
 
 
 def _held(path: SurfacePath, strategy: Strategy) -> Rotation:

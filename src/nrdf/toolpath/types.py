@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -41,6 +41,8 @@ class Segment:
         is not one feed all along; `feed_m_s` is then their mean over the way.
     force_n: contact force along tool z, at least 0, or None where nothing is touched.
     dwell_s: pause at the segment's last waypoint.
+    on_surface: (n,) bool, where the tool is over the surface that it works; false where a process
+        segment runs off the part, or turns beyond its edge without lifting. None: everywhere.
     """
 
     kind: SegmentKind
@@ -51,6 +53,15 @@ class Segment:
     force_n: float | None = None
     dwell_s: float = 0.0
     feeds_m_s: np.ndarray | None = None
+    on_surface: np.ndarray | None = None
+
+    @property
+    def over_surface(self) -> np.ndarray:
+        """Whether (n,) the tool is over the surface at each waypoint of a process segment; nowhere
+        on free moves."""
+        if self.on_surface is not None:
+            return self.on_surface
+        return np.full(len(self.positions), self.kind == "process")
 
     @property
     def speeds_m_s(self) -> np.ndarray:
@@ -117,6 +128,37 @@ class ToolPath:
     def groups(self) -> tuple[SegmentGroup, ...]:
         """Every process segment, in driving order, with its approach and retract."""
         return group_segments(self.segments)
+
+
+def split_at_edges(segment: Segment) -> list[Segment]:
+    """A process segment as those on the surface and those off it, without force, in turn.
+
+    A segment off the surface ends at the waypoint at which the tool is back on it; the next one
+    begins there. One that is on the surface all along stays as it is.
+    """
+    there = segment.over_surface
+    if segment.kind != "process" or there.all():
+        return [segment]
+    cuts = np.flatnonzero(np.diff(there.astype(int))) + 1
+    starts, stops = [0, *cuts], [*cuts, len(there)]
+    parts = []
+    for start, stop in zip(starts, stops, strict=True):
+        over = bool(there[start])
+        last = stop == len(there)
+        chosen = slice(start, stop if over or last else stop + 1)
+        feeds = segment.feeds_m_s
+        parts.append(
+            replace(
+                segment,
+                positions=segment.positions[chosen],
+                quaternions_xyzw=segment.quaternions_xyzw[chosen],
+                feeds_m_s=None if feeds is None else feeds[chosen],
+                force_n=segment.force_n if over else None,
+                dwell_s=segment.dwell_s if last else 0.0,
+                on_surface=None if over else np.zeros(len(segment.positions[chosen]), bool),
+            )
+        )
+    return parts
 
 
 def group_segments(segments: Iterable[Segment]) -> tuple[SegmentGroup, ...]:

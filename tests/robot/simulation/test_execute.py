@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from builders.plate_job import write_job_on
+from nrdf.geometry.polylines import resample
 from nrdf.robot.model.cell import Placement
 from nrdf.robot.simulation.execute import execute, heights
 from nrdf.robot.simulation.job import read_simulation_job
@@ -49,3 +50,34 @@ def test_actions_that_are_known_are_not_executed_again(plate):
     again = execute(path.cell, actions, mesh, mesh, np.zeros(3), {id(actions[0]): path.logs[0]})
     assert again[0] is path.logs[0] and again[1] is not logs[id(actions[1])]
     np.testing.assert_allclose(again[1].joints[-1], path.logs[1].joints[-1], atol=1e-4)
+
+
+def run_off_job(folder, marked):
+    """Two lines on a plate, joined 60 mm beyond its edge."""
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(-0.15, 0.15, (2500, 2))
+    top = np.stack([flat[:, 0], np.full(2500, 0.42), flat[:, 1]], axis=1)
+    up = np.tile([0.0, 1.0, 0.0], (2500, 1))
+    corners = np.array([[0.0, -0.03], [0.21, -0.03], [0.21, 0.03], [0.0, 0.03]])
+    at = resample(corners, 0.015)
+    line = np.stack([at[:, 0], np.full(len(at), 0.42), at[:, 1]], axis=1)
+    held = np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (len(line), 1))
+    over = line[:, 0] < 0.15 if marked else None
+    stroke = Segment("process", 0, line, held, 0.05, 10.0, on_surface=over)
+    points, normals = np.concatenate([top, top - [0.0, 0.03, 0.0]]), np.concatenate([up, -up])
+    return write_job_on(folder, points, normals, 2500, [stroke])
+
+
+def test_beyond_an_edge_the_tool_is_held_where_it_was_planned(arm, tmp_path):
+    place = Placement((0.75, 0, 0.3), np.pi, 0.3, (0.0,))
+    within, depth = {}, {}
+    for marked in (True, False):
+        (folder := tmp_path / str(marked)).mkdir()
+        (path,) = simulate(
+            read_simulation_job(run_off_job(folder, marked)), arm, placement=place
+        ).paths
+        within[marked] = path.metrics.force_within
+        tips = np.concatenate([log.tip for log in path.logs if log.action.kind == "process"])
+        depth[marked] = 0.42 - tips[tips[:, 0] > 0.19, 1].min()
+    assert within[True] > 0.95 > within[False]
+    assert depth[True] < 5e-3 < depth[False]

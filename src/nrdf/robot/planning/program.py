@@ -37,6 +37,7 @@ class Action:
     while the turntable turns. timed: joints at each step, the arm at rest at both ends. group,
     first: of a joint path, which segment group it is of and the waypoint that it begins at; -1 and
     0 elsewhere. angles_rad: (t,) of the turntable at each step where it turns, none elsewhere.
+    off_surface: (t,) bool, where a process leads beyond the object's edge; None: nowhere.
     """
 
     kind: ActionKind
@@ -47,6 +48,7 @@ class Action:
     force_n: float | None = None
     dwell_s: float = 0.0
     angles_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    off_surface: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -280,7 +282,13 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
         made = Action(kind, path.turntable_index, timed, group=path.group, first=path.first)
         if kind != "process":
             return made
-        return replace(made, force_n=process.force_n, dwell_s=process.dwell_s)
+        off = None
+        if process.on_surface is not None:
+            at, last = path.first + timed.waypoint, len(process.on_surface) - 1
+            before, after = np.floor(at + 1e-6).astype(int), np.ceil(at - 1e-6).astype(int)
+            there = process.on_surface
+            off = ~(there[np.clip(before, 0, last)] & there[np.clip(after, 0, last)])
+        return replace(made, force_n=process.force_n, dwell_s=process.dwell_s, off_surface=off)
 
     return [
         action("approach", into, np.arange(float(len(into))), approach.feed_m_s),

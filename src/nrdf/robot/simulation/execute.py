@@ -45,9 +45,9 @@ class ExecutionLog:
     """What happened during one action, a row for each step.
 
     joints: (t, n). waypoint: (t,), a number between the joint path's waypoints. working: (t,),
-    false while the tool waits for its force or dwells. force_n: (t,) that the sensor measures. tip,
-    axis: (t, 3) of the tool in the object's planned frame. off_m: (t,) of the tip from where it is
-    commanded to be, without the correction along the axis.
+    false while the tool waits for its force, dwells, or is beyond an edge. force_n: (t,) that the
+    sensor measures. tip, axis: (t, 3) of the tool in the object's planned frame. off_m: (t,) of the
+    tip from where it is commanded to be, without the correction along the axis.
     """
 
     action: Action
@@ -165,6 +165,7 @@ def _move(
     count = len(motion.joints)
     waits = round(action.dwell_s / STEP_S)
     record = _Record(arm, count + waits)
+    off = action.off_surface
     tip, axis = arm.tip()
     for i in [*range(count), *([count - 1] * waits)]:
         offset *= 0.97
@@ -178,7 +179,7 @@ def _move(
         tip, axis = arm.tip()
         away = tip - motion.positions[i]
         away = away - (away @ motion.axes[i]) * motion.axes[i] if offset else away
-        working = action.kind == "process"
+        working = action.kind == "process" and not (off is not None and off[i])
         record.add(
             arm, tip, axis, 0.0, float(np.sqrt(away @ away)), action.timed.waypoint[i], working
         )
@@ -209,7 +210,9 @@ def _press(
     record = _Record(arm, count + settling + dwelling)
     # The correction is what the scan predicts, and what the force asks for beyond it.
     correction, before, steady, i, waited, dwelt = -float(expected[0]), 0.0, 0, 0, 0, 0
-    working = False
+    # Beyond an edge there is nothing to press on: the tool is held where it was planned.
+    off = np.zeros(count, bool) if action.off_surface is None else action.off_surface
+    working = bool(off[0])
     tip, axis = arm.tip()
     still = np.zeros(motion.joints.shape[1])
     while True:
@@ -235,12 +238,14 @@ def _press(
         )
         tip, axis = arm.tip()
         force = arm.force(axis)
-        correction += min(max(gain * (wanted - force), -most), most)
+        if not off[i]:
+            correction += min(max(gain * (wanted - force), -most), most)
         correction = min(max(correction, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
         aside = away - depth * inward
         record.add(
-            arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i], moving
-        )
+            arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i],
+            moving and not off[i],
+        )  # fmt: skip
         if not working:
             waited += 1
             steady = steady + 1 if abs(force - wanted) < SETTLED_SHARE * wanted else 0

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from nrdf.geometry.polylines import total_length
+from nrdf.geometry.polylines import step_lengths
 from nrdf.toolpath.types import Segment
 
 FASTEST = 3.0
 """Times the feed that a tool centre point is driven at, at most."""
+_SAME = 1e-3
+"""Share by which feeds differ that are one."""
 
 
 def constant_speed(
@@ -21,22 +23,33 @@ def constant_speed(
 
     contacts: (n, 3), m, of each segment's waypoints. A tool that stands off, or touches with its
     edge, goes a longer way around an outer bend than its contact, and a shorter one in an inner
-    bend. A segment has one feed: what it keeps is the time that its contact should take as a
-    whole. The tool centre point is driven at no more than `fastest` times the feed, and no less
-    than the feed divided by that.
+    bend: every waypoint gets the feed of the way to it. The tool centre point is driven at no more
+    than `fastest` times the feed, and no less than the feed divided by that. A segment on which
+    that is one feed all along keeps one.
     """
-    return [
-        replace(segment, feed_m_s=speed_ratio(segment, places, fastest) * segment.feed_m_s)
-        for segment, places in zip(segments, contacts, strict=True)
-    ]
+    made = []
+    for segment, places in zip(segments, contacts, strict=True):
+        feeds = segment.feed_m_s * speed_ratios(segment, places, fastest)
+        way = step_lengths(segment.positions)
+        if len(feeds) < 2 or not way.any():
+            made.append(segment)
+            continue
+        mean = float(way.sum() / (way / feeds[1:]).sum())
+        one = bool((np.abs(feeds / mean - 1.0) < _SAME).all())
+        made.append(replace(segment, feed_m_s=mean, feeds_m_s=None if one else feeds))
+    return made
 
 
-def speed_ratio(segment: Segment, contacts: np.ndarray, fastest: float = FASTEST) -> float:
-    """How many times as fast as its contacts (n, 3), m, a segment's tool centre point moves.
+def speed_ratios(segment: Segment, contacts: np.ndarray, fastest: float = FASTEST) -> np.ndarray:
+    """How many times (n,) as fast as its contacts (n, 3), m, a segment's tool centre point moves on
+    the way to each waypoint; the first as the second.
 
-    Between 1 / `fastest` and `fastest`; 1 where either of them does not move at all.
+    Between 1 / `fastest` and `fastest`; 1 where neither moves.
     """
-    worked, way = total_length(contacts), total_length(segment.positions)
-    if worked <= 0.0 or way <= 0.0:
-        return 1.0
-    return float(np.clip(way / worked, 1.0 / fastest, fastest))
+    if len(contacts) < 2:
+        return np.ones(len(contacts))
+    worked, way = step_lengths(contacts), step_lengths(segment.positions)
+    still = (worked <= 0.0) & (way <= 0.0)
+    ratio = np.where(still, 1.0, way / np.maximum(worked, 1e-12))
+    ratio = np.clip(ratio, 1.0 / fastest, fastest)
+    return np.append(ratio[:1], ratio)
