@@ -143,7 +143,7 @@ def test_what_leads_off_the_surface_does_so_by_as_much_as_asked():
 
 
 def test_the_contact_keeps_the_feed_where_asked():
-    given = {"standoff_m": 0.02, "trajectory": "plane-slices", "line_order": "snake"}
+    given = {"standoff_m": 0.01, "trajectory": "plane-slices", "line_order": "snake"}
     across = np.array([0.0, 1.0, 0.0])
     for line in planned(tube(share=0.5), **given, direction=across, constant_speed=True):
         worked = step_lengths(contact_points(line, replace(STRATEGY, **given)))

@@ -132,9 +132,9 @@ def add_approach_retract(
             if index % 2:
                 line, outward = _backwards(line, outward, strategy), outward[::-1]
             driven.append(
-                replace(
-                    line, kind="process", line=len(driven), force_n=strategy.force_n,
-                    dwell_s=strategy.dwell_s,
+                Segment(
+                    "process", len(driven), line.positions, line.quaternions_xyzw, line.feed_m_s,
+                    strategy.force_n, strategy.dwell_s, line.feeds_m_s, line.on_surface,
                 )
             )  # fmt: skip
             under.append(outward)
