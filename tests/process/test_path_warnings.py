@@ -28,7 +28,7 @@ def test_a_good_path_has_no_warnings():
         ),
         (
             {"left_out": {"no_clearance": 0.194, "edge_margin": 0.1}},
-            "19.4% of the region has less than 0 mm free before it, and is left out",
+            "19.4% of the region has less than 6.25 mm free before it, and is left out",
         ),
         ({"step_worst_m": 0.287}, "a step of 287 mm between neighbouring waypoints; 20 mm were"),
         ({"turn_worst_rad": 1.6}, "the tool's axis turns by 91.67° between neighbouring waypoints"),

@@ -6,9 +6,11 @@ import numpy as np
 
 from nrdf.geometry.units import readable
 from nrdf.process.process import Process
+from nrdf.surface.tool_clearance import needed_clearance
 from nrdf.toolpath.metrics import ToolPathMetrics
 from nrdf.toolpath.region_samples import NO_CLEARANCE
 
+_LEAST_LEFT_OUT = 0.001
 _MOST_UNREACHED = 0.03
 _LARGEST_STEP = 2.0  # times the spacing of waypoints
 _LARGEST_TURN_RAD = np.radians(30.0)
@@ -20,8 +22,9 @@ _STEEPEST_RAD = np.radians(5.0)
 def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     """What a person should look at before a path runs on a robot."""
     lines = []
-    if metrics.left_out[NO_CLEARANCE] > 0.0:
-        clearance = readable("clearance_m", process.tool.clearance_m)
+    if metrics.left_out[NO_CLEARANCE] > _LEAST_LEFT_OUT:
+        needed = needed_clearance(process.tool.clearance_m, process.tool.radius_m)
+        clearance = readable("clearance_m", needed)
         lines.append(
             f"{metrics.left_out[NO_CLEARANCE]:.1%} of the region has less than {clearance} free "
             "before it, and is left out"

@@ -18,7 +18,17 @@ _OFF = 1e-5  # of the object's size, from which a ray starts before the surface
 _INSIDE = 0.5  # winding number
 _HALVINGS, _PARTS = 6, 2.0  # steps to where clearance ends; edges along the tool's radius
 _MOST_FACES = 60_000
+_SLIT = 0.25  # tool radii: into a narrower slit no tool goes, whatever clearance it is given
 _INWARD = 0.02  # share of the way to the faces around, at which a vertex is looked at
+
+
+def needed_clearance(clearance_m: float, tool_radius_m: float) -> float:
+    """What must be free before the surface where a tool works, m.
+
+    Its clearance, and a quarter of its radius at least. The one rule of what a tool can access:
+    planners, reports, simulation and benchmark ask `has_clearance` with it.
+    """
+    return max(clearance_m, _SLIT * tool_radius_m)
 
 
 def has_clearance(
@@ -46,6 +56,7 @@ def has_clearance(
 def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: float) -> RegionMesh:
     """A region without the places at which the tool lacks its clearance, cut within triangles.
 
+    Whole for a tool without one: what no tool accesses, planners then leave out side by side.
     Raises ProcessError where that leaves nothing.
     """
     if clearance_m <= 0.0:

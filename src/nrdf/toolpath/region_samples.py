@@ -10,7 +10,7 @@ from nrdf.errors import ProcessError
 from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
-from nrdf.surface.tool_clearance import accessible_region, has_clearance
+from nrdf.surface.tool_clearance import accessible_region, has_clearance, needed_clearance
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.strategy import Strategy
 
@@ -28,9 +28,10 @@ REASONS = {NO_CLEARANCE: "no clearance for the tool", MARGIN: "edge margin"}
 class Coverage:
     """What becomes of a whole region, in shares [0, 1] of its area that add up to 1.
 
-    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_clearance, where less than
-    the tool's clearance is free before the surface, whether the footprint reaches it or not, and
-    edge_margin, inside it and not reached. unreached: it should be worked, and is not.
+    worked: the footprint reaches it. left_out: by reason (`REASONS`): no_clearance, where less is
+    free before the surface than the tool needs (`nrdf.surface.tool_clearance`), whether the
+    footprint reaches it or not, and edge_margin, inside it and not reached. unreached: it should
+    be worked, and is not.
     """
 
     worked: float
@@ -61,7 +62,8 @@ class RegionSamples:
         """
         points, faces = sample_evenly(region.mesh, strategy.tool_radius_m / _PER_RADIUS)
         normals = region.mesh.face_normals[faces]
-        free = has_clearance(region.parent, points, normals, strategy.clearance_m)
+        needed = needed_clearance(strategy.clearance_m, strategy.tool_radius_m)
+        free = has_clearance(region.parent, points, normals, needed)
         inside: np.ndarray = np.ones(len(points), bool)
         margin = strategy.edge_margin_m
         if margin > 0.0:

@@ -13,14 +13,18 @@ from scipy.spatial import cKDTree
 from nrdf.geometry.polylines import step_lengths
 from nrdf.surface.given_surface import MeshSurface
 from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
+from nrdf.surface.tool_clearance import has_clearance, needed_clearance
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
-from nrdf_benchmark.mesh_paths.line_spacing import ALIKE, Line, line_spacing
+from nrdf_benchmark.mesh_paths.line_spacing import ALIKE, Line, Surface, line_spacing
 from nrdf_benchmark.mesh_paths.region_shape import RegionMatch, is_curved, parts_in_space
 from nrdf_benchmark.mesh_paths.targets import MeshTarget, face_components
 
 _LEAST_STEP_M = 1e-4  # that a turn is divided by
 _FITS = 0.8  # share of a disc that lies on a region which the footprint fits into
+_BESIDE, _STEP = 0.1, 0.25
+"""Stepovers that a place between two lines may be beside the region, and over or under it."""
 _ASKED = 400  # points at which a region is asked for room
 
 
@@ -30,17 +34,20 @@ class MeshPathMetrics:
 
     distance_99_m, distance_worst_m: of contact points from the given triangles. step_worst: largest
     step inside a stroke, in spacings; steps_above: how many are above 2. turn_worst_rad_m: largest
-    turn of the axis for each m of the way. coverage: share of the region's visible points within
-    the footprint. spacing_even: share of places whose neighbouring lines are 0.85 to 1.15 stepovers
+    turn of the axis for each m of the way. coverage: share within the footprint of
+    what should be worked: the region's visible points that were planned on and that the tool can
+    access. spacing_even: share of places whose neighbouring lines are 0.85 to 1.15 stepovers
     apart, and spacing_worst the farthest, in stepovers; None where no line has a neighbour.
     strokes: process segments; stroke_ratio: median of their length over the region's extent along
     them; short_strokes: shorter than the tool's radius; needless_strokes: those of them that cover
     less than 2 % of the region. surface_m, air_m: way on the surface, and off it.
     fits: whether the footprint fits into the region somewhere. area_m2: of the visible region.
     parts: its parts, in space, that are no smaller than the footprint, at least 1. curved: whether
-    its sides bend under the tool. left_out, unreached: shares of it without a stroke, outside
-    the region that was planned on and inside it. border_ratio: length of the border that was
-    planned with, for that of the given region; iou: of the two regions; None where they are one.
+    its sides bend under the tool. Shares of all of it: left_out, without a stroke outside the
+    region that was planned on; no_clearance, where no tool gets to
+    (`nrdf.surface.tool_clearance.needed_clearance`); unreached, what should be worked and is not.
+    border_ratio: length of the border that was planned with, for that of the given region; iou: of
+    the two regions; None where they are one.
     """
 
     distance_99_m: float
@@ -62,6 +69,7 @@ class MeshPathMetrics:
     parts: int = 1
     curved: bool = False
     left_out: float = 0.0
+    no_clearance: float = 0.0
     unreached: float = 0.0
     border_ratio: float | None = None
     iou: float | None = None
@@ -83,6 +91,7 @@ def measure_mesh_path(
 
     planned: the region that was planned on, where it was found, and not given.
     """
+    radius = strategy.tool_radius_m
     work = [segment for segment in segments if segment.kind == "process"]
     contacts = [s.positions + strategy.standoff_m * s.axes for s in work]
     axes = [s.axes for s in work]
@@ -94,22 +103,26 @@ def measure_mesh_path(
     lines = [Line.of(c, a, strategy) for c, a in zip(contacts, axes, strict=True)]
     indices = target.indices(region)
     points, normals = target.skin.points[indices], target.skin.normals[indices]
-    covered = [_covered(points, normals, line, strategy.tool_radius_m) for line in lines]
+    covered = [_covered(points, normals, line, radius) for line in lines]
     lengths = np.array([float(step.sum()) for step in steps])
-    short = lengths < strategy.tool_radius_m
+    short = lengths < radius
     shares = np.array([len(one) for one in covered]) / len(points)
     reached = np.zeros(len(points), bool)
     reached[np.concatenate(covered)] = True
     found = RegionMatch.of(target, region, planned)
-    apart = line_spacing(lines, strategy.stepover_m, points, normals, target.point_area_m2)
-    apart = apart / strategy.stepover_m
+    room = has_clearance(
+        target.given_mesh, points, normals, needed_clearance(strategy.clearance_m, radius)
+    )
+    wanted = found.inside & room
+    surface = _surface_of(target, region, strategy)
+    apart = line_spacing(lines, strategy.stepover_m, surface) / strategy.stepover_m
     return MeshPathMetrics(
         distance_99_m=float(np.quantile(distance, 0.99)),
         distance_worst_m=float(distance.max()),
         step_worst=float(every_step.max() / strategy.spacing_m),
         steps_above=int((every_step > 2.0 * strategy.spacing_m).sum()),
         turn_worst_rad_m=float(np.concatenate([*turns, np.zeros(1)]).max()),
-        coverage=float(reached.mean()),
+        coverage=float(reached[wanted].mean()) if wanted.any() else 1.0,
         spacing_even=float(((apart >= 0.85) & (apart <= 1.15)).mean()) if len(apart) else None,
         spacing_worst=float(apart.max()) if len(apart) else None,
         strokes=len(work),
@@ -118,15 +131,36 @@ def measure_mesh_path(
         needless_strokes=int((short & (shares < 0.02)).sum()),
         surface_m=float(lengths.sum()),
         air_m=_air(segments),
-        fits=footprint_fits(target, region, strategy.tool_radius_m),
+        fits=footprint_fits(target, region, radius),
         area_m2=len(points) * target.point_area_m2,
-        parts=parts_in_space(points, target.point_area_m2, strategy.tool_radius_m),
-        curved=is_curved(points, normals, strategy.tool_radius_m),
-        left_out=float((~found.inside & ~reached).mean()),
-        unreached=float((found.inside & ~reached).mean()),
+        parts=parts_in_space(points, target.point_area_m2, radius),
+        curved=is_curved(points, normals, radius),
+        left_out=float((~found.inside & room & ~reached).mean()),
+        no_clearance=float((~room).mean()),
+        unreached=float((wanted & ~reached).mean()),
         border_ratio=found.border_ratio,
         iou=found.iou,
     )
+
+
+def _surface_of(target: MeshTarget, region: str, strategy: Strategy) -> Surface:
+    """Whether the given region is at places, and a tool can access it there."""
+    own = TargetMesh(target.vertices, target.faces[target.regions[region]])
+    needed = needed_clearance(strategy.clearance_m, strategy.tool_radius_m)
+
+    def surface(places: np.ndarray, outward: np.ndarray) -> np.ndarray:
+        found = own.nearest(places, outward)
+        off = found.points - places
+        sideways = off - np.einsum("ma,ma->m", off, outward)[:, None] * outward
+        there = np.linalg.norm(sideways, axis=1) < _BESIDE * strategy.stepover_m
+        there &= found.distances < _STEP * strategy.stepover_m
+        asked = np.flatnonzero(there)
+        there[asked] = has_clearance(
+            target.given_mesh, found.points[asked], found.normals[asked], needed
+        )
+        return there
+
+    return surface
 
 
 def footprint_fits(target: MeshTarget, region: str, radius_m: float) -> bool:

@@ -50,6 +50,7 @@ FIGURES = (
     _Figure("contacts from given mesh, 99 %, mm", "<= 0.1", 0.1, lambda m: 1e3 * m.distance_99_m),
     _Figure("contacts, worst, mm", "<= 0.5", 0.5, lambda m: 1e3 * m.distance_worst_m),
     _Figure("left out of the region, %", "", np.inf, lambda m: 100.0 * m.left_out),
+    _Figure("no clearance for a tool, %", "", np.inf, lambda m: 100.0 * m.no_clearance),
     _Figure("unreached in it, %", "<= 1", 1.0, lambda m: 100.0 * m.unreached),
     _Figure("border for the true one's", "<= 1.1", 1.1, lambda m: m.border_ratio),
     _Figure("IoU with the true region, %", "", 0.0, lambda m: m.iou and 100.0 * m.iou, True),

@@ -26,6 +26,7 @@ from nrdf.geometry.mesh import (
     triangle_crosses,
 )
 from nrdf.io.formats.meshes import load_mesh
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.strategy import Strategy
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh, read_labels, read_objects
 
@@ -60,6 +61,11 @@ class MeshTarget:
         """`SAMPLES` points of the outer skin, less those that nothing outside sees."""
         rng = np.random.default_rng(zlib.crc32(self.name.encode()))
         return outer_skin(self.vertices, self.faces, SAMPLES, rng)[1]
+
+    @cached_property
+    def given_mesh(self) -> TargetMesh:
+        """The mesh as it was given, nothing repaired: what stands before a place is asked of it."""
+        return TargetMesh(self.vertices, self.faces)
 
     @cached_property
     def point_area_m2(self) -> float:

@@ -50,7 +50,8 @@ def test_what_was_left_out_is_told_from_what_was_not_reached():
     assert match.border_ratio == pytest.approx((0.6 + diagonal) / 1.2, rel=1e-3)
     path = rows_on_top(np.arange(-0.0875, 0.0, 0.025))
     figures = measure_mesh_path(target, "top", path, PLATE, found)
-    assert figures.left_out + figures.unreached == pytest.approx(1.0 - figures.coverage)
+    assert 1.0 - figures.coverage == pytest.approx(figures.unreached / match.inside.mean())
+    assert figures.no_clearance == 0.0
     assert 0.05 < figures.left_out < 0.4 and 0.1 < figures.unreached < 0.4
     whole = measure_mesh_path(target, "top", path, replace(PLATE, tool_radius_m=0.03))
     assert whole.left_out == 0.0 and whole.unreached > 0.4 and whole.iou is None

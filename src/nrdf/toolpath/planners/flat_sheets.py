@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.surface.tool_clearance import has_clearance
+from nrdf.surface.tool_clearance import has_clearance, needed_clearance
 from nrdf.toolpath.planners.field_lines import Part
 
 _FLAT = 0.995  # length of a sheet's mean normal
@@ -34,13 +34,11 @@ _STRAIGHT = 0.3  # of a sheet's border: what runs one way gives its direction
 def with_room(region: RegionMesh, sheets: Sequence[Part], radius_m: float) -> list[Part]:
     """Sheets without those in slits, whose walls no tool of that radius comes to; all of them where
     none would be left."""
-    kept = []
+    needed, kept = needed_clearance(0.0, radius_m), []
     for sheet in sheets:
         mesh = sheet.mesh
         chosen = np.linspace(0, len(mesh.faces) - 1, min(_PROBES, len(mesh.faces))).astype(int)
-        free = has_clearance(
-            region.parent, mesh.centres[chosen], mesh.normals[chosen], _SLIT * radius_m
-        )
+        free = has_clearance(region.parent, mesh.centres[chosen], mesh.normals[chosen], needed)
         area = mesh.areas[chosen]
         if float(area[free].sum()) > _ROOM * float(area.sum()):
             kept.append(sheet)
