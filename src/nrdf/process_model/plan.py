@@ -1,0 +1,141 @@
+"""Planning by the result: lines, run-off and feeds with which a region gets what it should have.
+
+The taught plan, at one feed, stands beside it: both are measured in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nrdf.errors import ProcessError
+from nrdf.process_model.feed_planner import (
+    FeedLimits,
+    plan_feeds,
+    usual_slowness,
+    within_acceleration,
+)
+from nrdf.process_model.plate_theory import best_stepover
+from nrdf.process_model.removal import Pad
+from nrdf.process_model.result import ResultMetrics, Target
+from nrdf.process_model.result_model import ResultModel, Tool, cells_for, with_feeds
+from nrdf.process_model.spray_profile import SprayProfile
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.mesh_planner import plan_on_mesh
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.types import Segment
+
+_RUN_OFF = 0.33  # half-widths along the travel: slower ends do the rest
+
+
+@dataclass(frozen=True)
+class PlannedResult:
+    """A path planned by its result.
+
+    segments: with their feeds. model: what they leave; metrics: of that. taught: metrics of the
+    taught plan, at the one feed that gives half of the region the target.
+    """
+
+    segments: tuple[Segment, ...]
+    model: ResultModel
+    metrics: ResultMetrics
+    taught: ResultMetrics
+
+
+def plan_by_result(
+    region: RegionMesh,
+    taught: Sequence[Segment],
+    strategy: Strategy,
+    tool: Tool,
+    target: Target,
+    limits: FeedLimits,
+    replan: bool = True,
+) -> PlannedResult:
+    """The path whose result comes nearest to the target over the region.
+
+    taught: the path as taught, which stays as it is but for its feeds where it may not be planned
+    anew. Raises ProcessError where the target is out of reach, saying what is not.
+    """
+    check_reachable_at_all(tool)
+    cells = cells_for(region, tool)
+    before = ResultModel.of(region, taught, tool, cells)
+    plain = before.measure(target, constant_feeds(before, target, limits))
+    lines = tuple(taught)
+    if replan:
+        lines = plan_on_mesh(region, strategy_for(strategy, tool))
+    model = ResultModel.of(region, lines, tool, cells) if replan else before
+    feeds = feeds_for(model, target, limits)
+    segments = with_feeds(lines, model.moves, feeds)
+    model = replace(model, moves=replace(model.moves, feeds_m_s=feeds))
+    return PlannedResult(segments, model, model.measure(target), plain)
+
+
+def feeds_for(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
+    """Feeds (m,), m/s, with which a path comes nearest to a target. Raises ProcessError where it is
+    out of reach."""
+    check_in_reach(model, target, limits)
+    inside = model.cells.inside
+    return plan_feeds(
+        model.on_region, model.fixed[inside], model.region_areas_m2, model.spill_m3(),
+        target.value_m, target.tolerance_m, model.moves, limits,
+    )  # fmt: skip
+
+
+def constant_feeds(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
+    """One feed for all moves (m,), with which half of the region has the target; slower where the
+    arm cannot be as fast."""
+    inside = model.cells.inside
+    slowness = usual_slowness(
+        model.on_region, model.fixed[inside], model.region_areas_m2, target.value_m, limits
+    )
+    feeds = np.full(len(model.moves.lengths_m), 1.0 / slowness)
+    return within_acceleration(feeds, model.moves, limits)
+
+
+def strategy_for(strategy: Strategy, tool: Tool) -> Strategy:
+    """The lines for a tool: as far apart as theory has them even, on a plate; a gun's run off by a
+    part of its half-width. What is taught finer stays."""
+    stepover = min(strategy.stepover_m, best_stepover(tool))
+    run_off = strategy.run_off_m
+    if isinstance(tool, SprayProfile):
+        run_off = _RUN_OFF * tool.ends_m[1]
+    return replace(strategy, stepover_m=stepover, run_off_m=run_off, constant_speed=False)
+
+
+def check_reachable_at_all(tool: Tool) -> None:
+    """Raise ProcessError for a pad whose depth no feed changes."""
+    if isinstance(tool, Pad) and tool.spindle_rad_s == 0.0:
+        raise ProcessError(
+            "a pad that does not turn takes off the same at every feed (depth goes with the way "
+            "that it slides): give spindle_rad_s, or change force_n or passes instead of a target"
+        )
+
+
+def check_in_reach(model: ResultModel, target: Target, limits: FeedLimits) -> None:
+    """Raise ProcessError where half of the region cannot have the target within the limits, with
+    what it can have."""
+    inside = model.cells.inside
+    each = np.asarray(model.on_region.sum(axis=1)).ravel()
+    fixed = model.fixed[inside]
+    least, most = (
+        _median(each / feed + fixed, model.region_areas_m2)
+        for feed in (limits.most_m_s, limits.least_m_s)
+    )
+    if least - target.tolerance_m <= target.value_m <= most + target.tolerance_m:
+        return
+    low, high = 1e3 * limits.least_m_s, 1e3 * limits.most_m_s
+    other = "more" if target.value_m > most else "less"
+    what = "flow, passes or time" if model.flow_m3_s else "force, spindle speed, passes or time"
+    raise ProcessError(
+        f"a target of {1e6 * target.value_m:.4g} µm is out of reach: at feeds of {low:.4g} to "
+        f"{high:.4g} mm/s half of the region gets {1e6 * most:.3g} µm at most and "
+        f"{1e6 * least:.3g} µm at least; give a target between them, or a tool with {other} {what}"
+    )
+
+
+def _median(values: np.ndarray, areas_m2: np.ndarray) -> float:
+    order = np.argsort(values)
+    summed = np.cumsum(areas_m2[order])
+    return float(values[order[int(np.searchsorted(summed, 0.5 * summed[-1]))]])

@@ -1,0 +1,70 @@
+"""Planning by the result."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nrdf.errors import ProcessError
+from nrdf.process_model.cells import plate
+from nrdf.process_model.feed_planner import FeedLimits
+from nrdf.process_model.plan import plan_by_result, strategy_for
+from nrdf.process_model.plate_theory import best_stepover
+from nrdf.process_model.removal import Pad
+from nrdf.process_model.result import Target
+from nrdf.process_model.spray_profile import SprayProfile
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.mesh_planner import plan_on_mesh
+from nrdf.toolpath.strategy import Strategy
+
+GUN = SprayProfile(0.05, 0.05, 5e-7, 0.15)
+TARGET = Target(60e-6, 6e-6)
+TAUGHT = Strategy(stepover_m=0.03, spacing_m=0.01, tool_radius_m=0.05, standoff_m=0.15,
+                  line_order="snake", run_off_m=0.05)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def region():
+    mesh = plate(0.5, 0.4, 0.02)
+    bent = mesh.vertices.copy()
+    bent[:, 2] = 0.012 * np.cos(2.0 * np.pi * bent[:, 0] / 0.4)
+    whole = type(mesh)(bent, mesh.faces)
+    return RegionMesh.from_faces(whole, np.ones(len(mesh.faces), bool))
+
+
+def test_a_wavy_plate_is_painted_evenly_with_less_waste(region):
+    taught = plan_on_mesh(region, TAUGHT)
+    made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, FeedLimits())
+    assert made.metrics.within > 0.95 > made.taught.within + 0.2
+    assert made.metrics.variation < 0.5 * made.taught.variation
+    assert made.metrics.overspray < 0.9 * made.taught.overspray
+    again = [s for s in made.segments if s.kind == "process"]
+    assert all(s.feeds_m_s is not None for s in again)
+
+
+def test_a_taught_path_keeps_its_lines(region):
+    taught = plan_on_mesh(region, TAUGHT)
+    made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, FeedLimits(), replan=False)
+    for old, new in zip(taught, made.segments, strict=True):
+        np.testing.assert_array_equal(old.positions, new.positions)
+
+
+@pytest.mark.parametrize(("value", "said"), [(5e-3, "µm at most"), (1e-7, "less flow")])
+def test_a_target_out_of_reach_says_what_is_reachable(region, value, said):
+    taught = plan_on_mesh(region, TAUGHT)
+    with pytest.raises(ProcessError, match=f"out of reach: at feeds of 10 to 1000 mm/s.*{said}"):
+        plan_by_result(region, taught, TAUGHT, GUN, Target(value, 0.1 * value), FeedLimits())
+
+
+def test_a_pad_that_does_not_turn_has_no_target(region):
+    still = Pad(0.05, 2e7, 5e-9, 20.0)
+    with pytest.raises(ProcessError, match="does not turn takes off the same at every feed"):
+        plan_by_result(region, (), TAUGHT, still, TARGET, FeedLimits())
+
+
+def test_lines_are_as_theory_has_them_but_no_farther_apart_than_taught():
+    made = strategy_for(TAUGHT, GUN)
+    assert made.stepover_m == pytest.approx(min(best_stepover(GUN), 0.03))
+    assert made.run_off_m == pytest.approx(0.33 * 0.05)
+    pad = Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
+    assert strategy_for(TAUGHT, pad).run_off_m == TAUGHT.run_off_m

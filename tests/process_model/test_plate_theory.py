@@ -1,0 +1,30 @@
+"""The best constant stepover on a plate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nrdf.process_model.plate_theory import best_stepover, strip_of, variation
+from nrdf.process_model.removal import Pad
+from nrdf.process_model.spray_profile import SprayProfile
+
+GUN = SprayProfile(0.1, 0.05, 1e-6, 0.2)
+
+
+def test_gaussian_passes_are_as_even_as_their_first_harmonic_says():
+    gun = SprayProfile(0.03, 0.03, 1e-6, 0.2, "gaussian")
+    stepover = 0.07
+    wave = 2.0 * np.exp(-2.0 * (np.pi * 0.03 / stepover) ** 2) / np.sqrt(2.0)
+    assert variation(gun, stepover) == pytest.approx(wave, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "tool", [GUN, Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025), Pad(0.05, 2e7, 5e-9, 20.0, 300.0)]
+)
+def test_the_best_stepover_is_even_and_a_wider_one_is_not(tool):
+    best = best_stepover(tool)
+    for share in (0.5, 0.8, 1.0):
+        assert variation(tool, share * best) <= 0.03
+    assert variation(tool, 1.04 * best) > 0.025
+    assert strip_of(tool, np.array([0.2])) == pytest.approx(0.0)
