@@ -16,6 +16,7 @@ from nrdf.commands.transfer import job_folders
 from nrdf.commands.transfer_run import TransferRun
 from nrdf.errors import CloudError, ConfigError, LimitError, NothingFoundError
 from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.serve.object_transfer import ObjectTransfer
 from nrdf.toolpath.file import read_toolpaths
 
 
@@ -264,7 +265,7 @@ def test_the_exit_code_is_the_worst(four, monkeypatch, errors, code):
             raise error
 
     monkeypatch.setattr(TransferRun, "transfer", transferred)
-    monkeypatch.setattr(TransferRun, "process_transfer", None)
+    monkeypatch.setattr(ObjectTransfer, "process_transfer", None)
     targets = [f"{number}.ply" for number in range(len(errors))]
     assert cli.run(["transfer", "box.yaml", *targets]) == code
 

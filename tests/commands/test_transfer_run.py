@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from nrdf.commands.scan_input import ScanOptions
 from nrdf.commands.transfer_run import TransferRun, show_transfer
 from nrdf.errors import OutputError, ProcessError
 from nrdf.process.limits import Limits
+from nrdf.serve.object_transfer import ObjectTransfer
 
 
 @pytest.fixture
 def run(tmp_path):
-    return TransferRun(tmp_path / "no.yaml", None, "cpu", ScanOptions(None), (), None, Limits())
+    return TransferRun(ObjectTransfer(tmp_path / "no.yaml"), (), Limits())
 
 
 def test_a_full_folder_is_refused_before_the_knowledge_is_read(run, tmp_path):

@@ -17,7 +17,7 @@ from nrdf.commands.console import (
     write_report,
 )
 from nrdf.commands.options import File, Folder, Sensors, Skip, Unit, Up
-from nrdf.commands.scan_input import ScanOptions, describe_alignment, read_scan, warn_of_scan
+from nrdf.serve.scan_input import ScanOptions, describe_alignment, read_scan, warn_of_scan
 
 if TYPE_CHECKING:
     from nrdf.scans.aligned_scan import AlignedScan

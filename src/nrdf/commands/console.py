@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 import logging
-import platform
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console, JustifyMethod
 from rich.table import Table
 
+from nrdf.reports.origin import provenance as provenance
+from nrdf.reports.origin import versions as versions
+
 console = Console(highlight=False, markup=False, soft_wrap=True)
 """Results go to standard output. Paths are not broken, and brackets are no markup."""
 errors = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
 """Progress, warnings and errors go to standard error."""
-
-REPORTED = ("nrdf", "torch", "numpy", "scipy", "trimesh", "libigl", "safetensors", "tyro")
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that results depend on."""
-    found = {"python": platform.python_version()}
-    for name in REPORTED:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
 
 
 def table(title: str, *columns: str, texts: int = 1) -> Table:
@@ -89,12 +77,6 @@ def progress_bars(names: Sequence[str]) -> Iterator[Callable[[str, int, int], No
     ) as progress:
         tasks = {name: progress.add_task(name, total=None) for name in names}
         yield lambda name, done, total: progress.update(tasks[name], completed=done, total=total)
-
-
-def provenance(metadata: dict[str, Any]) -> dict[str, Any]:
-    """Of a model's metadata, what a report says about where the model comes from."""
-    keys = ("name", "file", "category", "preset", "commit", "date", "scores", "shapes")
-    return {key: metadata[key] for key in keys if key in metadata}
 
 
 def command_line() -> str:

@@ -18,7 +18,8 @@ from nrdf.commands.console import (
     write_report,
 )
 from nrdf.commands.options import File, Folder, Sensors, Skip, Unit, Up
-from nrdf.commands.scan_input import (
+from nrdf.errors import NothingFoundError
+from nrdf.serve.scan_input import (
     ScanOptions,
     alignment_examples,
     describe_alignment,
@@ -26,7 +27,6 @@ from nrdf.commands.scan_input import (
     warn_of,
     warn_of_scan,
 )
-from nrdf.errors import NothingFoundError
 
 if TYPE_CHECKING:
     import numpy as np

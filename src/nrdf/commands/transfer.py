@@ -97,9 +97,10 @@ def transfer(
         device: cpu, cuda, cuda:N or auto.
         overwrite: Replace an earlier result in the output folder.
     """
-    from nrdf.commands.scan_input import ScanOptions
     from nrdf.commands.transfer_run import TransferRun
     from nrdf.process.limits import Limits
+    from nrdf.serve.object_transfer import ObjectTransfer
+    from nrdf.serve.scan_input import ScanOptions
 
     limits = Limits(
         min_coverage=min_coverage,
@@ -117,13 +118,12 @@ def transfer(
     if region and len(target) > 1:
         raise ConfigError("--region marks regions of one target; give one target")
     folders = job_folders(target, out)
-    run = TransferRun(
-        knowledge, model, device, scan, region, min_confidence, limits, strict, overwrite
-    )
+    objects = ObjectTransfer(knowledge, model, device, scan, min_confidence)
+    run = TransferRun(objects, region, limits, strict, overwrite)
     if len(target) == 1:
         run.transfer(target[0], folders[0])
         return 0
-    run.process_transfer  # noqa: B018  knowledge that is wrong is so for every target
+    objects.process_transfer  # noqa: B018  knowledge that is wrong is so for every target
     outcomes = [_outcome(run, *pair) for pair in zip(target, folders, strict=True)]
     show_outcomes(outcomes)
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index)

@@ -1,4 +1,4 @@
-"""A scan as `align`, `retrieve` and `transfer` take it: read, cleaned, aligned, described."""
+"""A scan as the verbs and the line take it: read, cleaned, aligned, described."""
 
 from __future__ import annotations
 
@@ -45,7 +45,8 @@ def read_scan(
     """
     import numpy as np
 
-    import nrdf
+    from nrdf.io.cloud import read_cloud
+    from nrdf.scans.aligned_scan import align
 
     sensor = options.sensor
     if len(sensor) % 3:
@@ -53,9 +54,9 @@ def read_scan(
             f"--sensor has {len(sensor)} numbers; three are needed for each sensor: x y z"
         )
     positions = np.array(sensor, float).reshape(-1, 3) if sensor else None
-    cloud = nrdf.read_cloud(path, topic=options.topic)
+    cloud = read_cloud(path, topic=options.topic)
     up = options.up or "auto"
-    return nrdf.align(model, cloud, up, positions, options.unit, options.skip, examples)
+    return align(model, cloud, up, positions, options.unit, options.skip, examples)
 
 
 def alignment_examples(model: Model, reference: PointCloud) -> list[PointCloud]:

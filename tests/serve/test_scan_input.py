@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nrdf.commands.scan_input import ScanOptions, alignment_examples, read_scan, warn_of_scan
 from nrdf.errors import CloudError
 from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.serve.scan_input import ScanOptions, alignment_examples, read_scan, warn_of_scan
 
 
 def test_options_of_a_scan_need_up():
@@ -24,7 +24,7 @@ def test_options_of_a_scan_need_up():
 def test_sensors_are_passed_on_as_rows_of_three(tmp_path, monkeypatch):
     write_cloud(tmp_path / "scan.ply", PointCloud(np.random.default_rng(0).random((50, 3))))
     seen = []
-    monkeypatch.setattr("nrdf.align", lambda *given: seen.append(given), raising=False)
+    monkeypatch.setattr("nrdf.scans.aligned_scan.align", lambda *given: seen.append(given))
     read_scan(None, tmp_path / "scan.ply", ScanOptions("z", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), "mm"))
     model, cloud, up, sensors, unit, skip, examples = seen[0]
     assert (model, len(cloud), up, unit, skip, examples) == (None, 50, "z", "mm", (), ())
@@ -43,7 +43,7 @@ def test_warnings_and_a_guessed_unit_are_logged_with_the_file(caplog):
     scan = SimpleNamespace(
         unit=SimpleNamespace(origin="guessed", name="mm"), warnings=["two objects"]
     )
-    log = logging.getLogger("nrdf.commands.scan_input")
+    log = logging.getLogger("nrdf.serve.scan_input")
     log.addHandler(caplog.handler)
     with caplog.at_level(logging.INFO, log.name):
         warn_of_scan(scan, "scan.ply")
