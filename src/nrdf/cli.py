@@ -15,7 +15,6 @@ from nrdf.errors import ConfigError, NrdfError
 Verb = Callable[..., Any]
 
 USAGE = """usage: nrdf VERB ... [-v]
-
 Teach a surface process once, on one object; run it on every such object.
 """
 NOTES = """
@@ -31,7 +30,7 @@ BENCHMARK = ("eval", "ablate")
 FOR_MAKERS = ("model", *BENCHMARK)
 """Verbs that stand apart in the help."""
 RESUMABLE = (
-    "ablate", "eval bsrc", "eval presence", "model boxes", "model correspond", "model kind",
+    "ablate", "run", "eval bsrc", "eval presence", "model boxes", "model correspond", "model kind",
     "model prepare", "model synth", "model train", "model yaw",
 )  # fmt: skip
 """Verbs that go on where they were when the same command is given again."""
@@ -47,24 +46,15 @@ def verbs() -> dict[str, Verb]:
     from nrdf.commands.info import info
     from nrdf.commands.model import model
     from nrdf.commands.retrieve import retrieve
+    from nrdf.commands.run import run as run_line
     from nrdf.commands.simulate import simulate
     from nrdf.commands.studio import studio
     from nrdf.commands.teach import teach
     from nrdf.commands.transfer import transfer
 
     own = (
-        teach,
-        check,
-        transfer,
-        retrieve,
-        align,
-        cell,
-        export,
-        simulate,
-        studio,
-        demo,
-        info,
-        model,
+        *(teach, check, transfer, retrieve, align, cell, export, simulate, run_line, studio, demo),
+        *(info, model),
     )
     return {**{verb.__name__: verb for verb in own}, **_verbs_of_other_packages()}
 

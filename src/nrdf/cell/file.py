@@ -24,7 +24,7 @@ HEADER = """\
 #   nrdf cell check FILE            shows what it says and whether it fits
 #   nrdf export job --cell FILE     programs in the robot's base frame, tools named and switched
 #   nrdf simulate job --cell FILE   with its pose, tools and keep-out boxes
-#   nrdf run FILE inbox/ --out outbox/
+#   nrdf run FILE inbox/            every scan that arrives becomes a checked program
 # What a tool switches: an output, or lines of the controller's language, as for this spray gun.
 #   switches:
 #     - {during: line, kinds: [paint], outputs: {urscript: "2", rapid: doGun}, wait_on_s: 0.1,

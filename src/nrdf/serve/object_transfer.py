@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +36,7 @@ class ObjectTransfer:
     knowledge_file: Path
     model_name: str | None = None
     device: str = "cpu"
-    scan: ScanOptions = ScanOptions(None)
+    scan: ScanOptions = field(default_factory=lambda: ScanOptions(None))
     min_confidence: float | None = None
 
     @cached_property

@@ -1,0 +1,106 @@
+"""The table of a line's objects: a page with thumbnails, and CSV; the most doubtful first."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from nrdf.io.atomic import write_atomically
+from nrdf.io.file_names import spreadsheet_text
+from nrdf.reports.html import duration_in_words, write_html
+from nrdf.reports.job_folder import HTML_REPORT, PICTURE
+from nrdf.serve.outbox import REASON
+from nrdf.serve.store import OUTCOMES, ObjectRow
+
+PAGE, TABLE = "index.html", "objects.csv"
+MOST_DOUBTFUL = 10
+COLUMNS = (
+    *("id", "name", "source", "state", "reason", "category", "confidence", "coverage", "paths"),
+    *("skipped", "cycle_time_s", "warnings", "reached", "cpu_s", "attempts", "arrived", "seconds"),
+)
+_FIGURES = COLUMNS[5:14]
+
+
+def doubtful_first(rows: Sequence[ObjectRow]) -> list[ObjectRow]:
+    """Objects with a job, those to look at first, then by confidence and coverage, least first."""
+    judged = [row for row in rows if row.state in ("done", "look-at")]
+    return sorted(
+        judged,
+        key=lambda row: (
+            row.state == "done",
+            row.figures.get("confidence", 0.0),
+            row.figures.get("coverage", 0.0),
+        ),
+    )
+
+
+def table_rows(rows: Sequence[ObjectRow]) -> Iterator[dict[str, Any]]:
+    """What the table has of each object, by column; None where there is nothing to say."""
+    for row in rows:
+        arrived = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(row.arrived_s))
+        said = {"id": row.id, "name": row.name, "source": row.source, "state": row.state,
+                "reason": row.reason, "attempts": row.attempts, "arrived": arrived,
+                "seconds": None if row.seconds is None else round(row.seconds, 2)}  # fmt: skip
+        yield {name: said.get(name, row.figures.get(name)) for name in COLUMNS}
+
+
+def csv_text(rows: Sequence[ObjectRow]) -> str:
+    """The table as CSV; no cell is a spreadsheet's formula."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    for row in table_rows(rows):
+        writer.writerow(
+            {k: spreadsheet_text(v) if isinstance(v, str) else v for k, v in row.items()}
+        )
+    return text.getvalue()
+
+
+def write_summary(out: Path, rows: Sequence[ObjectRow], name: str, refresh_s: int = 0) -> None:
+    """Write the page and the table of all objects into an outbox. Raises OutputError.
+
+    name: the cell's. refresh_s: after how long a browser loads the page again; 0: never.
+    """
+    write_atomically(out / TABLE, [csv_text(rows).encode()])
+    write_html(out / PAGE, "line.html", page_content(rows, name, refresh_s))
+
+
+def page_content(
+    rows: Sequence[ObjectRow], name: str, refresh_s: int = 0, at: str = ""
+) -> dict[str, Any]:
+    """What the page's template is filled with. at: where the objects' folders are, as a link."""
+    doubtful = doubtful_first(rows)[:MOST_DOUBTFUL]
+    counts = {state: sum(row.state == state for row in rows) for state in ("waiting", "running")}
+    counts |= {state: sum(row.state == state for row in rows) for state in OUTCOMES}
+    return {
+        "name": name,
+        "refresh_s": refresh_s,
+        "counts": counts,
+        "doubtful": [_shown(row, at) for row in doubtful],
+        "rows": [_shown(row, at) for row in rows],
+    }
+
+
+def _shown(row: ObjectRow, at: str) -> dict[str, Any]:
+    """An object as the page shows it."""
+    folder = f"{at}{row.state}/{row.name}"
+    has_job = "paths" in row.figures
+    figures = row.figures
+    share = {n: f"{figures[n]:.0%}" if n in figures else "–" for n in ("confidence", "coverage")}
+    seconds = figures.get("cycle_time_s")
+    return {
+        "name": row.name,
+        "state": row.state,
+        "reason": row.reason,
+        "report": f"{folder}/{HTML_REPORT if has_job else REASON}" if row.ended_s else "",
+        "picture": f"{folder}/{PICTURE}" if has_job and row.ended_s else "",
+        **share,
+        "paths": figures.get("paths", "–"),
+        "cycle_time": "–" if seconds is None else duration_in_words(seconds),
+        "cycle_time_s": seconds or 0.0,
+        "warnings": figures.get("warnings", "–"),
+    }
