@@ -62,3 +62,13 @@ def test_taught_waypoints_need_not_keep_a_stepover():
     taught = {"trajectory": "taught", "waypoints": [{"positions_m": [[0, 0, 0]]}]}
     apart = replace(METRICS, line_spacing_worst_m=0.05, step_worst_m=0.287, axis_error_99_rad=0.2)
     assert len(warnings_of(apart)) == 3 and warnings_of(apart, **taught) == []
+
+
+def test_a_body_that_touches_is_told_with_its_first_place():
+    touching = replace(METRICS, body_touches=0.12, body_touches_at_m=(0.1, 0.25, -0.03))
+    (line,) = warnings_of(touching)
+    assert line == (
+        "the tool's body would touch the object at 12.0% of the places along the lines, first at "
+        "(100, 250, -30) mm"
+    )
+    assert warnings_of(replace(METRICS, body_touches=0.0)) == []

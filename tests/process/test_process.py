@@ -79,6 +79,8 @@ def test_the_overlap_gives_the_stepover():
          "line 1: 0 quaternions_xyzw do not fit 1 positions_m"),
         ({**TAUGHT, "waypoints": [{"positions_m": [[0, 0, 0]],
           "quaternions_xyzw": [[0, 0, 0, 2]]}]}, "a quaternion needs length 1, not 2"),
+        ({"tool": {"radius_mm": 9, "body_radius_mm": 9}}, "body_radius_m needs body_length_m"),
+        ({"tool": {"radius_mm": 9, "body_length_mm": 2000}}, "tool.body_length_m is 2 (2000 mm)"),
         ({"tool": {"radius_mm": 0}}, "tool.radius_m: must be above 0.0, not 0.0"),
         ({"tool": {"radius_mm": 1, "nmae": "x"}}, "tool.nmae'; did you mean 'name'?"),
         ({"tool": {"radius_mm": 1, "name": "a\nb"}}, "a name needs printable characters"),

@@ -47,6 +47,12 @@ def path_warnings(process: Process, metrics: ToolPathMetrics) -> list[str]:
     if metrics.turn_worst_rad > _LARGEST_TURN_RAD:
         turn = readable("_rad", metrics.turn_worst_rad)
         lines.append(f"the tool's axis turns by {turn} between neighbouring waypoints")
+    if metrics.body_touches and metrics.body_touches_at_m is not None:
+        place = ", ".join(f"{1e3 * x:.0f}" for x in metrics.body_touches_at_m)
+        lines.append(
+            f"the tool's body would touch the object at {metrics.body_touches:.1%} of the places "
+            f"along the lines, first at ({place}) mm"
+        )
     lines += _distance_warnings(process, metrics)
     if metrics.axis_error_99_rad > _STEEPEST_RAD and process.trajectory != "taught":
         error = readable("error_rad", metrics.axis_error_99_rad)

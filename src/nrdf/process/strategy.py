@@ -58,6 +58,8 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         minimum_length_m=process.minimum_length_m,
         join_gap_m=process.join_gap_m,
         constant_speed=process.constant_speed,
+        body_radius_m=process.tool.radius_of_body_m,
+        body_length_m=process.tool.body_length_m or 0.0,
     )
 
 

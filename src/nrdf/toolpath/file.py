@@ -227,6 +227,8 @@ class _StrategyContent(StrictModel):
     minimum_length_m: float | None = None
     join_gap_m: float | None = None
     constant_speed: bool = False
+    body_radius_m: float = 0.0
+    body_length_m: float = 0.0
 
     def made(self, where: str) -> Strategy:
         content = {name: getattr(self, name) for name in type(self).model_fields}

@@ -17,6 +17,7 @@ from nrdf.toolpath.modifiers import (
     drag,
     edge_contact,
     join,
+    largest_step,
     minimum_length,
     offset,
     one_way,
@@ -107,6 +108,8 @@ def modified(
         way = project if strategy.run_off_m == 0.0 else _straight
         joined = join(paths, way, spacing, strategy.joined_gap_m, may_turn=_may_turn(strategy))
         paths = _sequence(smooth_orientation(split(joined, step), turn), strategy)
+    height = strategy.standoff_m + strategy.offset_m
+    paths = largest_step(paths, project, height, step)
     dragged = drag(paths, strategy.drag_m, 0.5 * strategy.stepover_m)
     return offset(dragged, strategy.offset_m)
 

@@ -20,6 +20,7 @@ from nrdf.toolpath.line_spacing import line_spacing
 from nrdf.toolpath.region_samples import RegionSamples
 from nrdf.toolpath.sampled_path import SampledPath
 from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.tool_body import touching_places
 from nrdf.toolpath.tool_segments import contact_points
 from nrdf.toolpath.types import Segment
 
@@ -49,6 +50,10 @@ class ToolPathMetrics:
     larger; the largest turn of the tool's axis between them; and the largest turn by length of the
     step, where steps of less than 1 mm count as 1 mm.
 
+    body_touches: share of the places along process segments at which the tool's body would touch
+    the object (`nrdf.toolpath.tool_body`), the first of them at body_touches_at_m; None where the
+    body is not known.
+
     process_length_m: of the process segments; path_length_m: of all, free moves between them
     included; cycle_time_s: dwells included; of an arm
     (`nrdf.toolpath.cycle_time`) where it is known how the object stands, else at the feeds given.
@@ -74,6 +79,8 @@ class ToolPathMetrics:
     true_distance_worst_m: float | None = None
     true_distance_99_m: float | None = None
     true_distance_95_m: float | None = None
+    body_touches: float | None = None
+    body_touches_at_m: tuple[float, float, float] | None = None
 
 
 def measure_path(
@@ -125,6 +132,12 @@ def measure_path(
         process_length_m=process,
         cycle_time_s=time,
     )
+    if strategy.body_length_m > 0.0:
+        touched, share_touched = touching_places(
+            work, region.parent, strategy.body_radius_m, strategy.body_length_m
+        )
+        first = None if not len(touched) else (*touched[0].tolist(),)
+        made = replace(made, body_touches=share_touched, body_touches_at_m=first)
     if given is None:
         return made
     runs = [(k, run) for k in range(once) for run in _on_surface(work[k])]

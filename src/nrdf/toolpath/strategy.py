@@ -32,6 +32,7 @@ _AT_LEAST_ZERO = (
     "edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m", "retract_distance_m",
     "dwell_s", "run_off_m", "run_off_height_m", "lead_in_radius_m", "lead_out_radius_m",
     "edge_contact_m", "chord_error_m", "resample_step_m", "minimum_length_m", "join_gap_m",
+    "body_radius_m", "body_length_m",
 )  # fmt: skip
 _EITHER_SIGN = ("offset_m", "drag_m")
 
@@ -54,7 +55,9 @@ class Strategy:
     stepover_m: between neighbouring lines, along the surface; spacing_m: between waypoints, about;
     edge_margin_m: waypoints keep that far inside the region's border, and the footprint may reach
     over; tool_radius_m: of the footprint. clearance_m: that much must be free before the surface,
-    along its normal, where it is worked.
+    along its normal, where it is worked. body_radius_m, body_length_m: of the tool's body, a
+    cylinder that reaches back from the tool centre point, which tells where it would touch the
+    object; a length of 0: not known.
     lead_rad: tilts the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
     the normal. heading: tool x along the travel, or along one direction. standoff_m: from the tool
     centre point to the surface along the tool's axis. offset_m: along the surface's normal,
@@ -113,6 +116,8 @@ class Strategy:
     minimum_length_m: float | None = None
     join_gap_m: float | None = None
     constant_speed: bool = False
+    body_radius_m: float = 0.0
+    body_length_m: float = 0.0
 
     def __post_init__(self) -> None:
         for name, names in _NAMES.items():

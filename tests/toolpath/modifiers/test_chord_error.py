@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nrdf.geometry.polylines import longest_step
-from nrdf.toolpath.modifiers import chord_error
+from nrdf.geometry.polylines import longest_step, step_lengths
+from nrdf.toolpath.modifiers import chord_error, largest_step
 from nrdf.toolpath.surface_path import SurfacePath
 
 RADIUS = 0.05
@@ -57,3 +57,26 @@ def test_a_place_off_the_surface_is_not_taken():
 
     (made,) = chord_error([around()], nowhere, 1e-5)
     assert longest_step(made.contacts) == longest_step(around().contacts)
+
+
+def test_a_tool_that_stands_off_makes_no_long_steps_around_a_bend():
+    angle = np.linspace(0.0, 1.5, 16)  # steps of 5 mm on a roller of 50 mm
+    out = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+
+    def project(points, normals):
+        around = points / np.linalg.norm(points, axis=1, keepdims=True)
+        return 0.05 * around, around, np.ones(len(points), bool)
+
+    path = SurfacePath(0.05 * out, out)
+    (made,) = largest_step([path], project, 0.2, 0.02)
+    tips = made.contacts + 0.2 * made.normals
+    assert step_lengths(path.contacts + 0.2 * path.normals).max() > 0.02
+    assert step_lengths(tips).max() <= 0.02
+    assert np.linalg.norm(made.contacts, axis=1) == pytest.approx(0.05)
+    assert largest_step([path], project, 0.0, 0.02)[0] is path
+    # What runs off stays straight.
+    ahead = path.contacts[-1] + np.outer([0.005, 0.01], [np.cos(1.5), 0.0, -np.sin(1.5)])
+    longer = SurfacePath(np.concatenate([path.contacts, ahead]), np.concatenate([out, out[-2:]]))
+    (made,) = largest_step([longer], project, 0.2, 0.004)
+    assert np.linalg.norm(made.contacts[-1] - ahead[-1]) == 0.0
+    assert np.linalg.norm(made.contacts, axis=1)[-3:].min() > 0.0502

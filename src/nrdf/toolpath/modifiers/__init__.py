@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from nrdf.toolpath.modifiers.approach_retract import approach_retract
-from nrdf.toolpath.modifiers.chord_error import chord_error
+from nrdf.toolpath.modifiers.chord_error import chord_error, largest_step
 from nrdf.toolpath.modifiers.constant_speed import constant_speed
 from nrdf.toolpath.modifiers.join import join
 from nrdf.toolpath.modifiers.minimum_length import minimum_length
@@ -30,6 +30,7 @@ PATH_MODIFIERS: dict[str, Callable[..., list[SurfacePath]]] = {
     "minimum-length": minimum_length,
     "resample": resample,
     "chord-error": chord_error,
+    "largest-step": largest_step,
     "one-way": one_way,
     "start": start_at,
     "order-nearest": order_nearest,
