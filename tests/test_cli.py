@@ -141,3 +141,18 @@ def test_output_that_nobody_can_take_is_no_traceback(words):
         )
     assert "Traceback" not in done.stderr and done.returncode != 0
     assert "No space left on device" in done.stderr
+
+
+def test_targets_may_come_after_other_options():
+    words = ["transfer", "k.yaml", "--out", "jobs", "--target", "a", "b", "--workers", "2"]
+    assert cli._with_targets_first(words) == [
+        "transfer",
+        "k.yaml",
+        "a",
+        "b",
+        "--out",
+        "jobs",
+        "--workers",
+        "2",
+    ]
+    assert cli._with_targets_first(["transfer", "k", "a"]) == ["transfer", "k", "a"]

@@ -71,7 +71,7 @@ def run(given: list[str], verbose: bool = False) -> int:
     """Run one command; the exit code."""
     _configure_logging(verbose)
     try:
-        return _run(_with_axes_joined(given))
+        return _run(_with_targets_first(_with_axes_joined(given)))
     except NrdfError as error:
         _complain(str(error))
         return error.exit_code
@@ -159,6 +159,17 @@ def _with_axes_joined(given: list[str]) -> list[str]:
         else:
             words.append(word)
     return words
+
+
+def _with_targets_first(given: list[str]) -> list[str]:
+    """`transfer k.yaml --out jobs --target a b` as `transfer k.yaml a b --out jobs`."""
+    if given[:1] != ["transfer"] or "--target" not in given:
+        return given
+    at = given.index("--target")
+    end = next((i for i in range(at + 1, len(given)) if given[i].startswith("-")), len(given))
+    first = next((i for i in range(1, at) if given[i].startswith("-")), at)
+    targets, rest = given[at + 1 : end], given[:at] + given[end:]
+    return [*rest[:first], *targets, *rest[first:]]
 
 
 def _show_verbs() -> None:

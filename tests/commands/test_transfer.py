@@ -13,9 +13,9 @@ import trimesh
 from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
 from nrdf.commands.transfer import job_folders
-from nrdf.commands.transfer_run import TransferRun
 from nrdf.errors import CloudError, ConfigError, LimitError, NothingFoundError
 from nrdf.io.cloud import PointCloud, write_cloud
+from nrdf.serve.many import TransferOutcome
 from nrdf.serve.object_transfer import ObjectTransfer
 from nrdf.toolpath.file import read_toolpaths
 
@@ -224,7 +224,8 @@ def test_several_targets_have_a_folder_each_and_the_reference_is_encoded_once(
     assert cli.run([*words.split(), "--out", "jobs"]) == 2
     said = capsys.readouterr()
     assert len(encoded) == 1
-    assert sorted(p.name for p in (four / "jobs").iterdir()) == ["new", "other"]
+    assert sorted(p.name for p in (four / "jobs").iterdir() if p.is_dir()) == ["new", "other"]
+    assert (four / "jobs" / "objects.csv").read_text().count("\n") == 4
     for name in ("new", "other"):
         assert len(read_toolpaths(four / "jobs" / name).paths) == 2
     assert "broken.ply: " in said.err and "Traceback" not in said.err
@@ -233,12 +234,17 @@ def test_several_targets_have_a_folder_each_and_the_reference_is_encoded_once(
     assert list(rows) == ["new.ply", "broken.ply", "other.ply"]
     assert "good" in rows["new.ply"] and "no result" in rows["broken.ply"]
     assert "good" in rows["other.ply"]
-    # The folders that are there now are refused, each for itself; a new target is still done.
+    # Jobs that are there, made from the same, are not made again; a new target is.
+    before = (four / "jobs" / "new" / "report.json").stat().st_mtime_ns
     write_cloud(four / "third.ply", PointCloud(cloud(SIZE, seed=3).points, unit="m"))
     again = words.replace("broken.ply", "third.ply").split()
-    assert cli.run([*again, "--out", "jobs"]) == 2
-    assert capsys.readouterr().err.count("is not empty") == 2
+    assert cli.run([*again, "--out", "jobs"]) == 0
+    assert capsys.readouterr().err.count("made before") == 2
+    assert (four / "jobs" / "new" / "report.json").stat().st_mtime_ns == before
     assert (four / "jobs" / "third" / "report.html").exists()
+    # With another limit they are not the same: their folders are refused, each for itself.
+    assert cli.run([*again, "--out", "jobs", "--min-coverage", "0.1"]) == 2
+    assert capsys.readouterr().err.count("is not empty") == 3
 
 
 def test_knowledge_that_is_wrong_is_so_at_once_for_all_targets(four, untrained, capsys):
@@ -257,14 +263,12 @@ def test_knowledge_that_is_wrong_is_so_at_once_for_all_targets(four, untrained, 
     ],
 )
 def test_the_exit_code_is_the_worst(four, monkeypatch, errors, code):
-    waiting = iter(errors)
+    codes = iter(0 if e is None else getattr(e, "exit_code", 2) for e in errors)
 
-    def transferred(self, target, out):
-        error = next(waiting)
-        if error is not None:
-            raise error
+    def transferred(task, target, out):
+        return TransferOutcome(target, out, next(codes))
 
-    monkeypatch.setattr(TransferRun, "transfer", transferred)
+    monkeypatch.setattr("nrdf.serve.many.transfer_one", transferred)
     monkeypatch.setattr(ObjectTransfer, "process_transfer", None)
     targets = [f"{number}.ply" for number in range(len(errors))]
     assert cli.run(["transfer", "box.yaml", *targets]) == code

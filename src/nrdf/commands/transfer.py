@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional
 
-from nrdf.commands.console import console, errors, show, table
+from nrdf.commands.console import command_line, console, errors, progress_bar, show, table
 from nrdf.commands.options import File, Folder, Metavar, Sensors, Skip, Unit, Up
 from nrdf.errors import ConfigError, NrdfError
-from nrdf.io.bounds import Bounds, Fraction, NonNegative
+from nrdf.io.bounds import Bounds, Count, Fraction, NonNegative
 
 if TYPE_CHECKING:
-    from nrdf.commands.transfer_run import TransferRun
+    from nrdf.serve.many import TransferOutcome, TransferTask
 
 _SEVERITY = (0, 3, 4, 2)  # exit codes, from good to bad: with 2 there is no result
 
@@ -47,6 +46,8 @@ def transfer(
     any_kind: bool = False,
     strict: bool = False,
     device: str = "cpu",
+    workers: Count = 1,
+    cluster: Annotated[str, Metavar("ADDRESS")] | None = None,
     overwrite: bool = False,
 ) -> int:
     """Bring process knowledge to new objects, as tool paths.
@@ -59,7 +60,9 @@ def transfer(
     Ends with 3, after writing, where a limit that is set is not met, or the target looks like
     another kind of object, or one that lies or faces elsewhere; with 4 where no tool path could be
     planned. With several targets each is taken whatever becomes of the others, and the exit code is
-    the worst of theirs: 2 (no result) before 4, 4 before 3, 3 before 0.
+    the worst of theirs: 2 (no result) before 4, 4 before 3, 3 before 0. A target whose job is there
+    already, made from the same, is not done again: the same command goes on after an end. With
+    --out, OUT/index.html and OUT/objects.csv show all, the most doubtful first.
 
     Example: nrdf transfer chair.yaml new.ply --min-coverage 0.98
 
@@ -95,12 +98,16 @@ def transfer(
         strict: Limit: nothing may be doubtful about the target's pose, unit and kind, and about
             its regions, absent ones included.
         device: cpu, cuda, cuda:N or auto.
+        workers: Processes that work on several targets; more than one need nrdf[cluster].
+        cluster: Address of a Dask scheduler that does so instead: tcp://host:8786.
         overwrite: Replace an earlier result in the output folder.
     """
     from nrdf.commands.transfer_run import TransferRun
     from nrdf.process.limits import Limits
+    from nrdf.serve.many import TransferTask
     from nrdf.serve.object_transfer import ObjectTransfer
     from nrdf.serve.scan_input import ScanOptions
+    from nrdf.serve.summary import write_catalogue
 
     limits = Limits(
         min_coverage=min_coverage,
@@ -118,15 +125,41 @@ def transfer(
     if region and len(target) > 1:
         raise ConfigError("--region marks regions of one target; give one target")
     folders = job_folders(target, out)
-    objects = ObjectTransfer(knowledge, model, device, scan, min_confidence)
-    run = TransferRun(objects, region, limits, strict, overwrite)
-    if len(target) == 1:
-        run.transfer(target[0], folders[0])
+    if len(target) == 1 and cluster is None:
+        objects = ObjectTransfer(knowledge, model, device, scan, min_confidence)
+        TransferRun(objects, region, limits, strict, overwrite).transfer(target[0], folders[0])
         return 0
-    objects.process_transfer  # noqa: B018  knowledge that is wrong is so for every target
-    outcomes = [_outcome(run, *pair) for pair in zip(target, folders, strict=True)]
+    task = TransferTask(
+        knowledge, model, device, scan, min_confidence, limits, strict, overwrite, command_line()
+    )
+    outcomes = _transfer_many(task, list(zip(target, folders, strict=True)), workers, cluster)
     show_outcomes(outcomes)
+    if out is not None and len(target) > 1:
+        write_catalogue(out, outcomes, knowledge.stem)
+        console.print(f"all in {out}; {out}/index.html shows them")
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index)
+
+
+def _transfer_many(
+    task: TransferTask, pairs: list[tuple[Path, Path]], workers: int, cluster: str | None
+) -> list[TransferOutcome]:
+    """What becomes of each target, in their order; a line each as they come."""
+    from nrdf.serve.cluster import map_objects
+    from nrdf.serve.many import NO_RESULT, TransferOutcome, transfer_one
+
+    task.objects.process_transfer  # noqa: B018  knowledge that is wrong is so for every target
+    found: dict[int, TransferOutcome] = {}
+    items = [(task, *pair) for pair in pairs]
+    with progress_bar("targets") as progress:
+        for index, came in map_objects(transfer_one, items, workers, cluster):
+            if isinstance(came, NrdfError):
+                came = TransferOutcome(*pairs[index], NO_RESULT, (str(came),))
+            found[index] = came
+            progress(len(found), len(pairs))
+            style = None if came.exit_code == 0 else "yellow"
+            for reason in came.reasons or ("made before" if came.known else "good",):
+                errors.print(f"{came.target}: {reason}", style=style)
+    return [found[index] for index in range(len(pairs))]
 
 
 def job_folders(targets: Sequence[Path], out: Path | None) -> list[Path]:
@@ -150,40 +183,19 @@ def job_folders(targets: Sequence[Path], out: Path | None) -> list[Path]:
     return list(folders.values())
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one of several targets. report: None where nothing was written."""
-
-    target: Path
-    folder: Path
-    report: dict[str, Any] | None
-    exit_code: int
-
-
-def _outcome(run: TransferRun, target: Path, folder: Path) -> Outcome:
-    console.print(f"\n{target}")
-    code = 0
-    try:
-        run.transfer(target, folder)
-    except (NrdfError, OSError) as error:
-        errors.print(f"{target}: {error}", style="red")
-        code = getattr(error, "exit_code", 2)
-    return Outcome(target, folder, run.reports.get(folder), code)
-
-
-def show_outcomes(outcomes: Sequence[Outcome]) -> None:
+def show_outcomes(outcomes: Sequence[TransferOutcome]) -> None:
     """A table of several targets, and what became of each."""
     words = {0: "good", 2: "no result", 3: "a limit is not met", 4: "nothing planned"}
     shown = table("\nall targets", "target", "tool paths", "skipped", "time, s", "", "")
     for one in outcomes:
-        total = None if one.report is None else one.report["total"]
+        total = one.total
         cells = (
             ["–"] * 3
             if total is None
             else [str(total["paths"]), str(total["skipped"]), f"{total['cycle_time_s']:.0f}"]
         )
         style = None if one.exit_code == 0 else "yellow"
-        where = "" if one.report is None else str(one.folder)
+        where = "" if total is None else str(one.folder)
         shown.add_row(str(one.target), *cells, words[one.exit_code], where, style=style)
     show(shown)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from nrdf.process.limits import Limits
@@ -107,15 +108,16 @@ class ObjectTransfer:
         scan: AlignedScan | None,
         limits: Limits,
         command: str,
+        more: Mapping[str, Any] = MappingProxyType({}),
     ) -> dict[str, Any]:
-        """Write a transfer's job into an existing folder; what its report.json says."""
+        """Write a transfer's job into an existing folder; what its report.json says, `more` too."""
         from nrdf.reports.job_folder import write_job_files
 
         alignment = None if scan is None else describe_alignment(scan)
         origin = origin_of(
             command, str(self.knowledge_file), str(target), self.model.metadata, alignment
         )
-        return write_job_files(folder, result, limits, target.name, origin)
+        return write_job_files(folder, result, limits, target.name, {**origin, **more})
 
 
 def doubts(report: dict[str, Any], strict: bool) -> list[str]:

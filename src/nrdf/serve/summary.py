@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from nrdf.io.atomic import write_atomically
 from nrdf.io.file_names import spreadsheet_text
+from nrdf.io.result_folder import REPORT
 from nrdf.reports.html import duration_in_words, write_html
 from nrdf.reports.job_folder import HTML_REPORT, PICTURE
-from nrdf.serve.outbox import REASON
+from nrdf.serve.many import TransferOutcome
+from nrdf.serve.outbox import REASON, in_one_line
 from nrdf.serve.store import OUTCOMES, ObjectRow
 
 PAGE, TABLE = "index.html", "objects.csv"
@@ -67,6 +71,45 @@ def write_summary(out: Path, rows: Sequence[ObjectRow], name: str, refresh_s: in
     """
     write_atomically(out / TABLE, [csv_text(rows).encode()])
     write_html(out / PAGE, "line.html", page_content(rows, name, refresh_s))
+
+
+def write_catalogue(out: Path, outcomes: Sequence[TransferOutcome], name: str) -> None:
+    """The same page and table of jobs that stand side by side in `out`. Raises OutputError."""
+    states = {0: "done", 3: "look-at", 4: "look-at"}
+    rows = []
+    for number, one in enumerate(outcomes, start=1):
+        figures: dict[str, Any] = {}
+        with suppress(OSError, ValueError, KeyError):
+            figures = figures_of(json.loads((one.folder / REPORT).read_text("utf-8")))
+        state = states.get(one.exit_code, "refused")
+        label, source = one.target.name, str(one.target)
+        reason = in_one_line(list(one.reasons))
+        rows.append(ObjectRow(number, one.folder.name, source, 0, 0, label, state, reason, 1,
+                              time.time(), None, time.time(), figures))  # fmt: skip
+    write_atomically(out / TABLE, [csv_text(rows).encode()])
+    content = page_content(rows, name)
+    for shown in [*content["rows"], *content["doubtful"]]:
+        for key in ("report", "picture"):
+            shown[key] = shown[key].removeprefix(f"{shown['state']}/")
+    for shown in content["rows"]:
+        if shown["state"] == "refused":
+            shown["report"] = ""  # there is no folder
+    write_html(out / PAGE, "line.html", content)
+
+
+def figures_of(report: dict[str, Any]) -> dict[str, Any]:
+    """What tables say of a job: the least confidence and coverage, paths, cycle time, warnings."""
+    found = [region["confidence"] for region in report["regions"].values() if region["found"]]
+    planned = [path["metrics"] for path in report["paths"] if path["planned"]]
+    return {
+        "category": report.get("category", ""),
+        "confidence": round(min(found, default=0.0), 4),
+        "coverage": round(min((m["coverage"] for m in planned), default=0.0), 4),
+        "paths": report["total"]["paths"],
+        "skipped": report["total"]["skipped"],
+        "cycle_time_s": round(report["total"]["cycle_time_s"], 1),
+        "warnings": len(report["warnings"]),
+    }
 
 
 def page_content(

@@ -21,6 +21,7 @@ from nrdf.serve.object_transfer import ObjectTransfer, doubts, reasons_for_nothi
 from nrdf.serve.outbox import write_object
 from nrdf.serve.scan_input import ScanOptions
 from nrdf.serve.store import ObjectRow, Outcome
+from nrdf.serve.summary import figures_of
 from nrdf.toolpath.file import read_toolpaths
 
 log = logging.getLogger(__name__)
@@ -154,18 +155,3 @@ def _require_unchanged(row: ObjectRow) -> None:
             f"the file {row.source} has changed since it arrived; what it is now counts as another "
             "object"
         )
-
-
-def figures_of(report: dict[str, Any]) -> dict[str, Any]:
-    """What tables say of a job: the least confidence and coverage, paths, cycle time, warnings."""
-    found = [region["confidence"] for region in report["regions"].values() if region["found"]]
-    planned = [path["metrics"] for path in report["paths"] if path["planned"]]
-    return {
-        "category": report.get("category", ""),
-        "confidence": round(min(found, default=0.0), 4),
-        "coverage": round(min((m["coverage"] for m in planned), default=0.0), 4),
-        "paths": report["total"]["paths"],
-        "skipped": report["total"]["skipped"],
-        "cycle_time_s": round(report["total"]["cycle_time_s"], 1),
-        "warnings": len(report["warnings"]),
-    }
