@@ -21,6 +21,14 @@ def test_a_plate_has_ten_straight_lines_in_snake_order():
     assert all(np.ptp(path.contacts[:, 1]) < 1e-6 for path in paths)
 
 
+def test_stripes_that_the_users_stepover_leaves_are_not_filled():
+    # Four lines 50 mm apart by a tool 24 mm wide, on a plate that is four stepovers wide.
+    paths = plan_raster(plate(), replace(STRATEGY, stepover_m=0.05))
+    assert len(paths) == 4
+    apart = np.diff(sorted(float(path.contacts[:, 1].mean()) for path in paths))
+    np.testing.assert_allclose(apart, 0.05, atol=1e-4)
+
+
 def test_the_direction_is_followed_and_one_that_stands_refused():
     paths = plan_raster(plate(), replace(STRATEGY, direction=np.array([0.0, 2.0, 1.0])))
     assert len(paths) == 20 and all(np.ptp(path.contacts[:, 0]) < 1e-6 for path in paths)

@@ -20,6 +20,7 @@ from nrdf.toolpath.surface_path import SurfacePath
 _LARGE, _LEFT = 3.0, 0.2
 """Footprints: smaller sheets are asked for what is left of them, which must be that large."""
 _FRAME, _ARM = 4.0, 0.3  # stepovers that a frame's bars are wide; footprints that are left
+_STRIPE = 0.55  # stepovers: what is no farther from a line is no rest to be worked
 _LEFT_SHORT = 0.02  # of the region: what must be left of a sheet that is shorter than the radius
 
 
@@ -63,7 +64,8 @@ def _sheet_paths(
     if not paths or width(sheet.mesh) > _FRAME * strategy.stepover_m:
         return paths
     radius = strategy.tool_radius_m
-    left = ~reached_from_paths(sheet, [*beside, *paths], radius)
+    # Stripes between lines that are farther apart than the tool is wide are meant to stay.
+    left = ~reached_from_paths(sheet, [*beside, *paths], max(radius, _STRIPE * strategy.stepover_m))
     if strategy.edge_margin_m > 0.0 and sheet.border_distance is not None:
         left &= sheet.border_distance[sheet.mesh.faces].mean(axis=1) > strategy.edge_margin_m
     least = _ARM * np.pi * radius**2
