@@ -146,3 +146,41 @@ def frame() -> tuple[np.ndarray, np.ndarray]:
         np.concatenate([c.reshape(-1, 3) for c in corners]), axis=0, return_inverse=True
     )
     return size * places.astype(float), index.reshape(-1)[np.concatenate(faces)]
+
+
+def loop(radius: float = 0.011) -> RegionMesh:
+    """A tube that closes to a rounded square of 0.5 m, as the frame of a chair."""
+
+    def place(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        along, around = 2.0 * np.pi * v, 2.0 * np.pi * u
+        out = np.stack([np.cos(along), np.sin(along), 0.0 * along], axis=1)
+        # |x|^6 + |y|^6 = 1
+        far = 0.25 / (np.abs(out[:, :2]) ** 6).sum(axis=1) ** (1 / 6)
+        up = np.array([0.0, 0.0, 1.0])
+        return far[:, None] * out + radius * (
+            np.cos(around)[:, None] * out + np.sin(around)[:, None] * up
+        )
+
+    return flipped(sheet(place, 240, 32))
+
+
+def test_a_tube_that_closes_to_a_ring_has_few_strokes_all_along_it():
+    wide = replace(STRATEGY, stepover_m=0.025, tool_radius_m=0.025)
+    (part,) = parts_of(loop(), wide)
+    assert is_rod(part)
+    paths = plan_rod(loop(), wide)
+    assert len(paths) == 3
+    assert min(total_length(path.contacts) for path in paths) > 1.7
+
+
+def test_a_hole_for_a_screw_gets_nothing():
+    leg = trimesh.creation.box((0.04, 0.04, 0.5))
+    bore = trimesh.creation.cylinder(0.005, 0.1).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0])
+    )
+    drilled = leg.difference(bore)
+    mesh = TargetMesh(np.array(drilled.vertices), np.array(drilled.faces), ())
+    whole = RegionMesh.from_faces(mesh, np.ones(len(mesh.faces), bool))
+    for path in plan_rod(whole, STRATEGY):
+        inside = np.linalg.norm(path.contacts[:, 1:], axis=1) < 0.006
+        assert not (inside & (np.abs(path.contacts[:, 0]) < 0.015)).any()

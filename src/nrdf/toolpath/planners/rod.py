@@ -21,6 +21,7 @@ from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.polylines import step_lengths, total_length
 from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.tool_clearance import has_clearance
 from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, driven, refined
 from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
 from nrdf.toolpath.planners.ordering import snake_order
@@ -58,6 +59,7 @@ _MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.14, 0.9, 0.15
 _AWAY = 0.4  # stepovers from where a stroke should be: there is no surface
 _PART = 0.8  # of the usual section's length: what is shorter is cut at an end
 _WIDE = 0.5  # tool radii: what is left is wider
+_BORE, _ROOM = 4.0, 0.3  # footprints, and the share of the area before which there is room
 _REST = 0.2  # of a part's area that is in no rod
 
 
@@ -102,10 +104,13 @@ def rods_of(part: Part, spacing_m: float = 0.01) -> tuple[list[Rod], list[Part]]
 def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """Strokes from end to end of every rod; what is no rod, and ends that are large, get a raster.
 
+    Holes for screws, which the tool does not fit into, get nothing.
     Raises ProcessError for a margin that leaves nothing.
     """
     found: list[SurfacePath] = []
     for part in _touching_parts(region, strategy):
+        if found and _is_bore(region, part, strategy.tool_radius_m):
+            continue
         rods, rest = rods_of(part, strategy.spacing_m)
         strokes = [path for rod in rods for path in _strokes(region, part, rod, strategy)]
         if strokes:
@@ -113,6 +118,8 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
             rest = _pieces(part, left)
         found += strokes
         for piece in rest:
+            if strokes and _is_bore(region, piece, strategy.tool_radius_m):
+                continue
             if not strokes or _is_wide(piece, strategy.tool_radius_m):
                 lines = _raster(region, piece, strategy)
                 least = strategy.tool_radius_m if found else 0.0
@@ -185,7 +192,6 @@ def _strokes(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> li
 
 def _rod(mesh: FineMesh, points: np.ndarray, thickness_m: float, spacing_m: float) -> Rod | None:
     """The rod about an axis (n, 3); None where it is not slender, or mostly something else."""
-    mesh = untorn(mesh, RodFrame.of(points, thickness_m), thickness_m)
     frame = straightened(mesh, points, thickness_m)
     mesh = untorn(mesh, frame, thickness_m)
     at = frame.station(mesh.vertices)
@@ -307,6 +313,17 @@ def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
     order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0.0]
     chosen = [k for k in order if area[k] >= least] or order[:1]
     return [Part(fine.part(number == k)) for k in chosen]
+
+
+def _is_bore(region: RegionMesh, part: Part, radius_m: float) -> bool:
+    """Whether a small piece is the wall of a hole for a screw: the other wall is nearer than the
+    tool's radius."""
+    mesh = part.mesh
+    area = float(mesh.areas.sum())
+    if area > _BORE * np.pi * radius_m**2:
+        return False
+    free = has_clearance(region.parent, mesh.centres, mesh.normals, radius_m)
+    return float(mesh.areas[free].sum()) < _ROOM * area
 
 
 def _pieces(part: Part, chosen: np.ndarray) -> list[Part]:

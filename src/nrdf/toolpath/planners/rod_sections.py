@@ -105,9 +105,14 @@ class Section:
 
 def untorn(mesh: FineMesh, frame: RodFrame, thickness_m: float) -> FineMesh:
     """A rod's triangles without those between its two ends, where it closes to a ring."""
-    at = frame.station(mesh.vertices)[mesh.faces]
-    kept = np.ptp(at, axis=1) < max(2.0 * thickness_m, 2.0 * mesh.edge_m)
-    return mesh if kept.all() or not kept.any() else mesh.part(kept)
+    kept = _kept(mesh, frame.station(mesh.vertices), thickness_m)
+    return mesh if kept.all() else mesh.part(kept)
+
+
+def _kept(mesh: FineMesh, at: np.ndarray, thickness_m: float) -> np.ndarray:
+    """The triangles (f,) that are not between the two ends of a ring; at: (v,) stations, m."""
+    kept = np.ptp(at[mesh.faces], axis=1) < max(2.0 * thickness_m, 2.0 * mesh.edge_m)
+    return kept if kept.any() else np.ones(len(kept), bool)
 
 
 def straightened(mesh: FineMesh, points: np.ndarray, thickness_m: float) -> RodFrame:
@@ -115,11 +120,13 @@ def straightened(mesh: FineMesh, points: np.ndarray, thickness_m: float) -> RodF
     frame = RodFrame.of(points, thickness_m)
     for _ in range(_STRAIGHTENED):
         at = frame.station(mesh.vertices)
+        # Where a ring's two ends meet moves with its axis.
+        kept = _kept(mesh, at, thickness_m)
         low, high = float(at.min()), float(at.max())
         step = max(_STEP * thickness_m, 0.5 * mesh.edge_m)
         count = max(int((high - low) / step), 8)
         levels = low + (high - low) * (np.arange(count) + 0.5) / count
-        middle, around = _middles(mesh, at, levels)
+        middle, around = _middles(mesh, at, levels, kept)
         good = around > _USUAL * float(np.median(around))
         end = min(_SLANTED * thickness_m, 0.25 * (high - low))
         good &= (levels > low + end) & (levels < high - end)
@@ -138,14 +145,15 @@ def straightened(mesh: FineMesh, points: np.ndarray, thickness_m: float) -> RodF
 
 
 def _middles(
-    mesh: FineMesh, values: np.ndarray, levels: np.ndarray
+    mesh: FineMesh, values: np.ndarray, levels: np.ndarray, kept: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Middles (s, 3) of lines at levels (s,), evenly rising, of values (v,); lengths (s,), m."""
+    """Middles (s, 3) of lines at levels (s,), evenly rising, of values (v,), on the triangles that
+    are kept (f,); lengths (s,), m."""
     step = levels[1] - levels[0]
     corner = (values[mesh.faces] - levels[0]) / step
     first = np.maximum(np.ceil(corner.min(axis=1)).astype(int), 0)
     count = np.floor(corner.max(axis=1)).astype(int).clip(max=len(levels) - 1) - first + 1
-    count = np.maximum(count, 0)
+    count = np.where(kept, np.maximum(count, 0), 0)
     face = np.repeat(np.arange(len(mesh.faces)), count)
     level = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count) + first[face]
     one, other, crossed = crossings(mesh, values, face, levels[level])
