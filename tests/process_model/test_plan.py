@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,5 @@ def test_lines_are_as_theory_has_them_but_no_farther_apart_than_taught():
     assert made.run_off_m == pytest.approx(0.33 * 0.05)
     pad = Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
     assert strategy_for(TAUGHT, pad).run_off_m == TAUGHT.run_off_m
+    joined = replace(TAUGHT, line_order="zigzag", join_gap_m=0.1)
+    assert strategy_for(joined, pad).joined_gap_m == 0.0

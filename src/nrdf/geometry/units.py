@@ -28,6 +28,7 @@ _FAR = 3.0  # times outside of the usual sizes from which a unit that was given 
 
 OTHER_UNITS = {
     "_deg_mm": ("_rad_m", 1e3 * math.pi / 180),
+    "_mm3_s": ("_m3_s", 1e-9),
     "_mm_s": ("_m_s", 1e-3),
     "_mm": ("_m", 1e-3),
     "_deg": ("_rad", math.pi / 180),
@@ -38,6 +39,7 @@ OTHER_UNITS = {
 _SHOWN = (
     ("_rad_m", 180e-3 / math.pi, "° a mm"),
     ("_rad_s", 60 / (2 * math.pi), " rpm"),
+    ("_m3_s", 1e9, " mm³/s"),
     ("_m_s", 1e3, " mm/s"),
     ("_rad", 180 / math.pi, "°"),
     ("_m", 1e3, " mm"),

@@ -13,6 +13,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
 from nrdf.process.reference_paths import ReferencePaths
+from nrdf.process.result_target import plan_result, result_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import check_origin, normals_under, taught_segments
 from nrdf.surface.given_surface import GivenSurface
@@ -89,10 +90,13 @@ def check_process(
             taught = taught_segments(process, region.parent)
             normals = normals_under(region.parent, taught, strategy.tool_radius_m)
             segments = add_approach_retract(taught, normals, strategy)
+        result = plan_result(region, process, segments, process.waypoints is None)
+        if result is not None:
+            segments, strategy = result.segments, result.strategy
         metrics = measure_path(region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))
-    warnings += path_warnings(process, metrics)
+    warnings += path_warnings(process, metrics) + result_warnings(process, result)
     return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments))
 
 

@@ -21,6 +21,7 @@ from nrdf.process.quantities import (
     Vector,
     implausible,
 )
+from nrdf.process.result_keys import Amount, FeedLimitKeys, PadKeys, Profile
 from nrdf.toolpath.strategy import (
     DirectionMode,
     Heading,
@@ -68,6 +69,10 @@ class Tool(Quantities):
     """Tool centre point in the robot's flange frame."""
     tcp_quaternion_xyzw: Quaternion | None = None
     """Rotation from the tool frame (z into the part) to the flange frame."""
+    profile: Profile | None = None
+    """Of a spray gun: how much film it lays where."""
+    pad: PadKeys | None = None
+    """Of a sander or polisher: how much it takes off."""
 
     @property
     def radius_of_body_m(self) -> float:
@@ -219,6 +224,13 @@ class Process(Quantities):
     """The free move to a line."""
     retract: FreeMove = FreeMove()
     """The free move away from a line."""
+    thickness_um: Amount | None = None
+    """Film that is wanted, "60 ± 10"; stepover, run-off and feeds follow from it. Needs the tool's
+    profile."""
+    removal_um: Amount | None = None
+    """Depth that is wanted, "30 ± 10"; stepover and feeds follow from it. Needs the tool's pad."""
+    feed_limits: FeedLimitKeys = FeedLimitKeys()
+    """What tool and robot can do, where feeds follow from the result."""
     waypoints: Annotated[list[TaughtSegment], Field(fail_fast=True)] | None = None
     """The lines of a taught trajectory."""
     allow_unusual: bool = False
@@ -262,6 +274,7 @@ class Process(Quantities):
         elif self.stepover_m is None and self.overlap is None:
             raise ValueError(f"a {self.trajectory} needs stepover_m or overlap")
         self._direction_makes_sense()
+        self._result_makes_sense()
         if self.force_n is not None:
             self._contact_makes_sense(self.force_n)
         elif self.force_tolerance_n is not None:
@@ -311,6 +324,17 @@ class Process(Quantities):
             raise ValueError("edge_contact_m needs lead_rad or tilt_rad: an upright disc lies flat")
         if self.run_off_height_m > 0.0 and self.run_off_m == 0.0:
             raise ValueError("run_off_height_m needs run_off_m")
+
+    def _result_makes_sense(self) -> None:
+        if self.thickness_um is not None and self.removal_um is not None:
+            raise ValueError("give thickness_um or removal_um, not both")
+        if self.thickness_um is not None:
+            if self.tool.profile is None:
+                raise ValueError("thickness_um needs tool.profile, of the spray gun")
+            if self.standoff_m == 0.0:
+                raise ValueError("thickness_um needs standoff_m, of the gun over the surface")
+        if self.removal_um is not None and (self.tool.pad is None or self.force_n is None):
+            raise ValueError("removal_um needs tool.pad and force_n")
 
     def _taught_makes_sense(self) -> None:
         if not self.waypoints:

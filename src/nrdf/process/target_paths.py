@@ -15,6 +15,7 @@ from nrdf.geometry.units import readable
 from nrdf.process.correspondence import Correspondence
 from nrdf.process.process import Process, TaughtSegment
 from nrdf.process.reference_paths import ReferencePaths
+from nrdf.process.result_target import plan_result, result_warnings, with_lines_of
 from nrdf.process.strategy import strategy_of, tool_path
 from nrdf.process.taught_paths import check_origin
 from nrdf.process.transfer_result import FoundRegion, PathResult
@@ -82,11 +83,18 @@ class TargetPaths:
             else:
                 process, segments, lost = self._warp(region, number, process, found.mesh)
                 warnings += lost
+            result = plan_result(found.mesh, process, segments, process.waypoints is None)
+            if result is not None:
+                process, segments = with_lines_of(process, result), result.segments
+                strategy = strategy_of(process)
+                warnings += tuple(result_warnings(process, result))
             metrics = measure_path(found.mesh, strategy, segments, self.given, self.up)
         except ProcessError as error:
             return replace(made, process=process, reason=str(error))
         path = tool_path(region, process, segments)
-        return replace(made, process=process, path=path, metrics=metrics, warnings=warnings)
+        return replace(
+            made, process=process, path=path, metrics=metrics, warnings=warnings, result=result
+        )
 
     def _placed(self, region: str, process: Process) -> tuple[Process, tuple[str, ...]]:
         """A process with its direction and origin as they are on the target, and warnings."""

@@ -8,6 +8,7 @@ from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.process import Process, TransferMode
+from nrdf.process_model.plan import PlannedResult
 from nrdf.regions.match import Match
 from nrdf.scans.kind_check import KindCheck
 from nrdf.surface.region_mesh import RegionMesh
@@ -38,7 +39,8 @@ class PathResult:
 
     number: which of the region's processes, from 0. process: as it is on the target (its direction,
     or its warped waypoints, in the target's frame). transfer_mode: how it came there: "replan" or
-    "warp". path, metrics: None where there is no path, for the `reason`.
+    "warp". path, metrics: None where there is no path, for the `reason`. result: what the
+    process will leave, where it has a target.
     """
 
     region: str
@@ -49,6 +51,7 @@ class PathResult:
     metrics: ToolPathMetrics | None = None
     warnings: tuple[str, ...] = ()
     reason: str = ""
+    result: PlannedResult | None = None
 
 
 @dataclass(frozen=True)

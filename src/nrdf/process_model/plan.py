@@ -24,7 +24,7 @@ from nrdf.process_model.result_model import ResultModel, Tool, cells_for, with_f
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
-from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.strategy import LineOrder, Strategy
 from nrdf.toolpath.types import Segment
 
 _RUN_OFF = 0.33  # half-widths along the travel: slower ends do the rest
@@ -34,11 +34,12 @@ _RUN_OFF = 0.33  # half-widths along the travel: slower ends do the rest
 class PlannedResult:
     """A path planned by its result.
 
-    segments: with their feeds. model: what they leave; metrics: of that. taught: metrics of the
-    taught plan, at the one feed that gives half of the region the target.
+    segments: with their feeds; strategy: of their lines. model: what they leave; metrics: of that.
+    taught: metrics of the taught plan, at the one feed that gives half of the region the target.
     """
 
     segments: tuple[Segment, ...]
+    strategy: Strategy
     model: ResultModel
     metrics: ResultMetrics
     taught: ResultMetrics
@@ -64,12 +65,13 @@ def plan_by_result(
     plain = before.measure(target, constant_feeds(before, target, limits))
     lines = tuple(taught)
     if replan:
-        lines = plan_on_mesh(region, strategy_for(strategy, tool))
+        strategy = strategy_for(strategy, tool)
+        lines = plan_on_mesh(region, strategy)
     model = ResultModel.of(region, lines, tool, cells) if replan else before
     feeds = feeds_for(model, target, limits)
     segments = with_feeds(lines, model.moves, feeds)
     model = replace(model, moves=replace(model.moves, feeds_m_s=feeds))
-    return PlannedResult(segments, model, model.measure(target), plain)
+    return PlannedResult(segments, strategy, model, model.measure(target), plain)
 
 
 def feeds_for(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
@@ -96,12 +98,19 @@ def constant_feeds(model: ResultModel, target: Target, limits: FeedLimits) -> np
 
 def strategy_for(strategy: Strategy, tool: Tool) -> Strategy:
     """The lines for a tool: as far apart as theory has them even, on a plate; a gun's run off by a
-    part of its half-width. What is taught finer stays."""
-    stepover = min(strategy.stepover_m, best_stepover(tool))
+    part of its half-width. What is taught finer stays.
+
+    The tool lifts between lines: where it turns without lifting it must slow down, and leaves too
+    much at every reversal.
+    """
     run_off = strategy.run_off_m
     if isinstance(tool, SprayProfile):
         run_off = _RUN_OFF * tool.ends_m[1]
-    return replace(strategy, stepover_m=stepover, run_off_m=run_off, constant_speed=False)
+    order: LineOrder = "one-way" if strategy.line_order == "one-way" else "snake"
+    return replace(
+        strategy, stepover_m=min(strategy.stepover_m, best_stepover(tool)), run_off_m=run_off,
+        line_order=order, join_gap_m=0.0, constant_speed=False,
+    )  # fmt: skip
 
 
 def check_reachable_at_all(tool: Tool) -> None:

@@ -1,0 +1,105 @@
+"""Keys of a process for its result: what is wanted, a gun's profile or a pad, limits on feed."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from nrdf.process.quantities import NotNegative, PlausibleRange, Positive, Quantities
+
+_NUMBER = r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*(?:±|\+/-|\+-)\s*({_NUMBER})\s*(?:µm|μm|um)?\s*")
+_HOW = "write it as 60 ± 10, or as value: 60 and tolerance: 10"
+
+
+class Amount(Quantities):
+    """How much film or depth is wanted, in µm: "60 ± 10", or value and tolerance."""
+
+    value: Annotated[Positive, PlausibleRange(0.01, 10_000.0)]
+    """What is wanted, µm."""
+    tolerance: Positive
+    """How far off it may be, µm."""
+    most: Positive | None = None
+    """What may be there at most, µm, such as the layer that is sanded; more is warned of."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_text(cls, content: Any) -> Any:
+        if not isinstance(content, (str, int, float)) or isinstance(content, bool):
+            return content
+        found = _TEXT.fullmatch(str(content))
+        if found is None:
+            raise ValueError(f"{content!r} is no amount with a tolerance; {_HOW}")
+        return {"value": float(found[1]), "tolerance": float(found[2])}
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Amount:
+        if self.tolerance >= self.value:
+            raise ValueError(
+                f"a tolerance of {self.tolerance:g} on {self.value:g}; it must be below the value"
+            )
+        if self.most is not None and self.most < self.value:
+            raise ValueError(f"most is {self.most:g}, less than the value, {self.value:g}")
+        return self
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        mapping = handler.resolve_ref_schema(handler(core_schema))
+        text = {"type": "string", "pattern": f"^{_TEXT.pattern}$"}
+        return {"anyOf": [mapping, text], "description": mapping.get("description", "")}
+
+
+class Profile(Quantities):
+    """A spray gun's profile, on a plate at its stand-off; `nrdf profile` fits one to a strip."""
+
+    shape: Literal["beta", "gaussian"] = "beta"
+    """beta: ends at its half-widths; gaussian: they are its standard deviations."""
+    across_m: Annotated[Positive, PlausibleRange(1e-3, 0.5)]
+    """Half-width of the fan across the travel."""
+    along_m: Annotated[Positive, PlausibleRange(1e-3, 0.5)]
+    """Half-width of the fan along the travel."""
+    across_exponent: Annotated[float, Field(strict=True, ge=1.0, le=50.0)] = 2.0
+    """Of a beta profile, across: 1 a box, 2 a parabola, more a peak."""
+    along_exponent: Annotated[float, Field(strict=True, ge=1.0, le=50.0)] = 2.0
+    """Of a beta profile, along."""
+    flow_m3_s: Annotated[Positive, PlausibleRange(1e-11, 1e-4)]
+    """Film that arrives on a wide plate, each second: flow of paint by its solids and what losses
+    leave of it."""
+    standoff_m: Annotated[Positive | None, PlausibleRange(1e-3, 1.0)] = None
+    """Where the profile was measured; unless given, the process's stand-off."""
+
+
+class PadKeys(Quantities):
+    """A sanding or polishing pad."""
+
+    stiffness_n_m3: Annotated[Positive, PlausibleRange(1e5, 1e10)] = 2e7
+    """Pressure for each metre that it is pressed in: modulus of its foam by its thickness."""
+    preston_per_pa: Annotated[Positive, PlausibleRange(1e-13, 1e-6)]
+    """Depth for each pascal and metre of sliding: of grit and material, from a trial."""
+    orbit_m: Annotated[NotNegative, PlausibleRange(0.0, 0.02)] = 0.0
+    """Radius of the orbit of an orbital sander; 0: a disc that spins about its own axis."""
+
+
+class FeedLimitKeys(Quantities):
+    """What tool and robot can do where feeds are chosen by the result."""
+
+    least_m_s: Annotated[Positive, PlausibleRange(1e-4, 5.0)] = 0.01
+    """Least speed along lines."""
+    most_m_s: Annotated[Positive, PlausibleRange(1e-4, 5.0)] = 1.0
+    """Largest speed along lines."""
+    acceleration_m_s2: Annotated[Positive, PlausibleRange(0.01, 50.0)] = 2.0
+    """Largest acceleration, along the lines and at their bends."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> FeedLimitKeys:
+        if self.least_m_s > self.most_m_s:
+            raise ValueError(
+                f"least_m_s is {self.least_m_s:g}, more than most_m_s, {self.most_m_s:g}"
+            )
+        return self
