@@ -15,8 +15,9 @@ def write_job_on(folder, points, normals, region, segments):
     import nrdf
     from nrdf.process.knowledge import Knowledge, Reference, Region
     from nrdf.process.knowledge_file import write_knowledge
-    from nrdf.process.process import Process, Tool
+    from nrdf.process.process import Process
     from nrdf.process.strategy import tool_path
+    from nrdf.process.tool_keys import Tool
     from nrdf.toolpath.file import write_toolpaths
     from nrdf.toolpath.types import Job
 

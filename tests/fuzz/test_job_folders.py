@@ -21,8 +21,9 @@ from nrdf.export.registry import export_job
 from nrdf.geometry.similarity import Similarity, up_axis, upright
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
-from nrdf.process.process import Process, Tool
+from nrdf.process.process import Process
 from nrdf.process.strategy import tool_path
+from nrdf.process.tool_keys import Tool
 from nrdf.toolpath.file import read_toolpaths, write_toolpaths
 from nrdf.toolpath.types import Job, Segment
 

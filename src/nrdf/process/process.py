@@ -21,7 +21,8 @@ from nrdf.process.quantities import (
     Vector,
     implausible,
 )
-from nrdf.process.result_keys import Amount, FeedLimitKeys, PadKeys, Profile
+from nrdf.process.result_keys import Amount, FeedLimitKeys
+from nrdf.process.tool_keys import Tool
 from nrdf.toolpath.strategy import (
     DirectionMode,
     Heading,
@@ -48,42 +49,6 @@ _WITH_ORIGIN = ("raster", "plane-slices", "cross-hatch")
 _FEED, _LENGTH = PlausibleRange(1e-4, 5.0), PlausibleRange(0.0, 1.0)
 _SPACING = PlausibleRange(1e-4, 1.0)
 _TILT = PlausibleRange(-math.pi / 3, math.pi / 3)
-
-
-class Tool(Quantities):
-    """What touches or faces the surface."""
-
-    name: Name = "tool"
-    """Its name, for the robot's program."""
-    radius_m: Annotated[Positive, PlausibleRange(1e-4, 0.5)]
-    """Radius of its footprint on the surface."""
-    clearance_m: Annotated[NotNegative, _LENGTH] = 0.0
-    """Free space that it needs above the surface, along the normal; planned paths leave out places
-    that have less, such as crevices. 0: not checked."""
-    body_length_m: Annotated[Positive | None, _LENGTH] = None
-    """Length of its body, a cylinder that reaches back from the tool centre point along its axis.
-    With it, places where the body would touch the object are warned of."""
-    body_radius_m: Annotated[Positive | None, _LENGTH] = None
-    """Radius of that cylinder; unless given, that of the footprint."""
-    tcp_m: Annotated[Vector | None, PlausibleRange(-2.0, 2.0)] = None
-    """Tool centre point in the robot's flange frame."""
-    tcp_quaternion_xyzw: Quaternion | None = None
-    """Rotation from the tool frame (z into the part) to the flange frame."""
-    profile: Profile | None = None
-    """Of a spray gun: how much film it lays where."""
-    pad: PadKeys | None = None
-    """Of a sander or polisher: how much it takes off."""
-
-    @property
-    def radius_of_body_m(self) -> float:
-        """The body's radius, given or that of the footprint."""
-        return self.radius_m if self.body_radius_m is None else self.body_radius_m
-
-    @model_validator(mode="after")
-    def _body_has_a_length(self) -> Tool:
-        if self.body_radius_m is not None and self.body_length_m is None:
-            raise ValueError("body_radius_m needs body_length_m")
-        return self
 
 
 class FreeMove(Quantities):

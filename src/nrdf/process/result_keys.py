@@ -1,15 +1,15 @@
-"""Keys of a process for its result: what is wanted, a gun's profile or a pad, limits on feed."""
+"""Keys of a process for its result: what is wanted, and limits on the feeds that it takes."""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from nrdf.process.quantities import NotNegative, PlausibleRange, Positive, Quantities
+from nrdf.process.quantities import PlausibleRange, Positive, Quantities
 
 _NUMBER = r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(?:±|\+/-|\+-)\s*({_NUMBER})\s*(?:µm|μm|um)?\s*")
@@ -53,37 +53,6 @@ class Amount(Quantities):
         mapping = handler.resolve_ref_schema(handler(core_schema))
         text = {"type": "string", "pattern": f"^{_TEXT.pattern}$"}
         return {"anyOf": [mapping, text], "description": mapping.get("description", "")}
-
-
-class Profile(Quantities):
-    """A spray gun's profile, on a plate at its stand-off; `nrdf profile` fits one to a strip."""
-
-    shape: Literal["beta", "gaussian"] = "beta"
-    """beta: ends at its half-widths; gaussian: they are its standard deviations."""
-    across_m: Annotated[Positive, PlausibleRange(1e-3, 0.5)]
-    """Half-width of the fan across the travel."""
-    along_m: Annotated[Positive, PlausibleRange(1e-3, 0.5)]
-    """Half-width of the fan along the travel."""
-    across_exponent: Annotated[float, Field(strict=True, ge=1.0, le=50.0)] = 2.0
-    """Of a beta profile, across: 1 a box, 2 a parabola, more a peak."""
-    along_exponent: Annotated[float, Field(strict=True, ge=1.0, le=50.0)] = 2.0
-    """Of a beta profile, along."""
-    flow_m3_s: Annotated[Positive, PlausibleRange(1e-11, 1e-4)]
-    """Film that arrives on a wide plate, each second: flow of paint by its solids and what losses
-    leave of it."""
-    standoff_m: Annotated[Positive | None, PlausibleRange(1e-3, 1.0)] = None
-    """Where the profile was measured; unless given, the process's stand-off."""
-
-
-class PadKeys(Quantities):
-    """A sanding or polishing pad."""
-
-    stiffness_n_m3: Annotated[Positive, PlausibleRange(1e5, 1e10)] = 2e7
-    """Pressure for each metre that it is pressed in: modulus of its foam by its thickness."""
-    preston_per_pa: Annotated[Positive, PlausibleRange(1e-13, 1e-6)]
-    """Depth for each pascal and metre of sliding: of grit and material, from a trial."""
-    orbit_m: Annotated[NotNegative, PlausibleRange(0.0, 0.02)] = 0.0
-    """Radius of the orbit of an orbital sander; 0: a disc that spins about its own axis."""
 
 
 class FeedLimitKeys(Quantities):

@@ -13,7 +13,8 @@ import nrdf
 from nrdf.process.bound_knowledge import resolve
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.limits import Limits
-from nrdf.process.process import Process, Tool
+from nrdf.process.process import Process
+from nrdf.process.tool_keys import Tool
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.reports.job_folder import write_job_files
 from nrdf.shapes.families import get_family
