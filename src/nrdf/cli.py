@@ -15,13 +15,12 @@ from nrdf.errors import ConfigError, NrdfError
 Verb = Callable[..., Any]
 
 USAGE = """usage: nrdf VERB ... [-v]
-Teach a surface process once, on one object; run it on every such object.
-"""
+Teach a surface process once, on one object; run it on every such object."""
 NOTES = """
 All options, with an example: nrdf VERB --help. Debug messages: -v; --version.
-Exit codes: 0 all well; 1 some shapes not used; 2 bad input; 3 a limit is not
-met, or with --strict a result is doubtful; 4 nothing found or planned;
-130 Ctrl-C. With 3 and 4 the result is written all the same."""
+Exit codes: 0 all well; 1 some shapes not used; 2 bad input; 3 a limit not met,
+or with --strict doubtful; 4 nothing found or planned; 130 Ctrl-C. With 3 and 4
+the result is written all the same."""
 
 GROUPS = ("cell", "model", "eval")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
@@ -30,8 +29,8 @@ BENCHMARK = ("eval", "ablate")
 FOR_MAKERS = ("model", *BENCHMARK)
 """Verbs that stand apart in the help."""
 RESUMABLE = (
-    "ablate", "run", "eval bsrc", "eval presence", "model boxes", "model correspond", "model kind",
-    "model prepare", "model synth", "model train", "model yaw",
+    "ablate", "run", "serve", "eval bsrc", "eval presence", "model boxes", "model correspond",
+    "model kind", "model prepare", "model synth", "model train", "model yaw",
 )  # fmt: skip
 """Verbs that go on where they were when the same command is given again."""
 
@@ -47,14 +46,15 @@ def verbs() -> dict[str, Verb]:
     from nrdf.commands.model import model
     from nrdf.commands.retrieve import retrieve
     from nrdf.commands.run import run as run_line
+    from nrdf.commands.serve import serve
     from nrdf.commands.simulate import simulate
     from nrdf.commands.studio import studio
     from nrdf.commands.teach import teach
     from nrdf.commands.transfer import transfer
 
     own = (
-        *(teach, check, transfer, retrieve, align, cell, export, simulate, run_line, studio, demo),
-        *(info, model),
+        *(teach, check, transfer, retrieve, align, cell, export, simulate, run_line, serve, studio),
+        *(demo, info, model),
     )
     return {**{verb.__name__: verb for verb in own}, **_verbs_of_other_packages()}
 

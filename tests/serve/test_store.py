@@ -23,7 +23,7 @@ def test_a_file_has_one_row_and_a_changed_one_another(store):
     assert store.add("/in/a.ply", 10, 2, "a.ply", set()) == 2
     assert store.add("/in/A.obj", 10, 1, "sub/A.obj", {"a-3"}) == 3
     assert [row.name for row in store.rows()] == ["A-4", "a-2", "a"]
-    assert store.known("/in/a.ply", 10, 2) and not store.known("/in/a.ply", 11, 2)
+    assert store.find("/in/a.ply", 10, 2).id == 2 and store.find("/in/a.ply", 11, 2) is None
 
 
 def test_an_outcome_is_final(store):

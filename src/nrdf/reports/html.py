@@ -23,8 +23,12 @@ def write_html(path: Path, template: str, content: Mapping[str, Any]) -> None:
 
     Text is escaped. Raises OutputError if the file cannot be written.
     """
-    text = _templates().get_template(template).render(content)
-    write_atomically(path, [text.encode()])
+    write_atomically(path, [html_text(template, content).encode()])
+
+
+def html_text(template: str, content: Mapping[str, Any]) -> str:
+    """A report from one of `reports/templates`, filled with `content`."""
+    return _templates().get_template(template).render(content)
 
 
 def write_transfer_html(

@@ -82,7 +82,7 @@ class Line:
     def take(self, file: ArrivedFile) -> int | None:
         """Queue a file; the id of its row, None where it has one."""
         source = str(file.path.absolute())
-        if self.store.known(source, file.bytes, file.mtime_ns):
+        if self.store.find(source, file.bytes, file.mtime_ns) is not None:
             return None
         self.changed += 1
         return self.store.add(source, file.bytes, file.mtime_ns, file.label, self.outbox.taken())

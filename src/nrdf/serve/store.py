@@ -117,10 +117,10 @@ class Store:
             )
             return int(cursor.lastrowid or 0)
 
-    def known(self, source: str, size: int, mtime_ns: int) -> bool:
-        """Whether this very file has a row."""
+    def find(self, source: str, size: int, mtime_ns: int) -> ObjectRow | None:
+        """The row of this very file; None where it has none."""
         rows = self._rows("WHERE source = ? AND bytes = ? AND mtime_ns = ?", source, size, mtime_ns)
-        return bool(rows)
+        return next(iter(rows), None)
 
     def claim(self) -> ObjectRow | None:
         """The object that waits longest, running from now on; None where none waits."""
