@@ -21,8 +21,8 @@ JSON = {"content-type": "application/json"}
 
 @pytest.fixture
 def client(start, tmp_path):
-    (tmp_path / "root").mkdir()
-    service = Service(start(size=1), "cell 3", ((tmp_path / "root").resolve(),))
+    (tmp_path / "allowed").mkdir()
+    service = Service(start(size=1), "cell 3", ((tmp_path / "allowed").resolve(),))
     thread = threading.Thread(target=service.run)
     thread.start()
     app = Guard(create_app(service), allowed_hosts("127.0.0.1", []), None, 2000)
@@ -61,14 +61,14 @@ def test_a_file_that_is_sent_becomes_a_job(client):
 
 
 def test_a_path_is_taken_within_the_roots_alone_and_once(client, tmp_path):
-    inside = tmp_path / "root" / "a.ply"
+    inside = tmp_path / "allowed" / "a.ply"
     inside.write_text("ok")
     first = client.post("/jobs", json={"path": str(inside)})
     assert first.status_code == 202
     assert client.post("/jobs", json={"path": str(inside)}).json()["id"] == first.json()["id"]
-    (tmp_path / "root" / "link.ply").symlink_to(tmp_path / "out" / "line.sqlite")
-    for path in ("/etc/passwd", str(tmp_path / "root"), f"{tmp_path}/root/../out/line.sqlite",
-                 str(tmp_path / "root" / "link.ply"), "a\0b", ""):  # fmt: skip
+    (tmp_path / "allowed" / "link.ply").symlink_to(tmp_path / "out" / "line.sqlite")
+    for path in ("/etc/passwd", str(tmp_path / "allowed"), f"{tmp_path}/allowed/../out/line.sqlite",
+                 str(tmp_path / "allowed" / "link.ply"), "a\0b", ""):  # fmt: skip
         assert client.post("/jobs", json={"path": path}).status_code == 403, path
 
 

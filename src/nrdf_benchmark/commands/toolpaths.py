@@ -39,9 +39,9 @@ def toolpaths(
     1.05 m. With more than one planner, they are shown side by side. Interrupted, the same command
     goes on. docs/evidence/toolpaths.md defines the figures.
 
-    Examples:
-        nrdf eval toolpaths --category chair --data bsrc/
-        nrdf eval toolpaths --meshes objects/ikea shapes/car --planner auto plane-slices --out out/
+    Example: nrdf eval toolpaths --category chair --data bsrc/
+
+    Or: nrdf eval toolpaths --meshes objects/ikea shapes/car --planner auto plane-slices --out out/
 
     Args:
         category: chair, car, plane or table; or give --meshes.
