@@ -35,3 +35,16 @@ def test_holes_are_filled_unless_they_are_large_taken_or_open(sheet):
     assert filled == pytest.approx([sheet.areas[small].sum()])
     assert kept == pytest.approx([sheet.areas[large].sum()])
     assert (Pieces(sheet).without_holes(inside, taken, np.inf)[0] == ~(taken | notch)).all()
+
+
+def test_known_regions_change_nothing(sheet):
+    large, speck = near(sheet, 0.1, 0.1, 0.08), near(sheet, 0.3, 0.1, 0.02)
+    hole = near(sheet, 0.1, 0.1, 0.02)
+    inside = (large & ~hole) | speck
+    known = Pieces(sheet, np.stack([inside, hole]))
+    for asked in (known, Pieces(sheet)):
+        kept, removed = asked.without_specks(inside, 0.002)
+        whole, filled, _ = asked.without_holes(kept, np.zeros(len(inside), bool), 0.002)
+        assert (whole == large).all()
+        assert removed == pytest.approx([sheet.areas[speck].sum()])
+        assert filled == pytest.approx([sheet.areas[hole].sum()])

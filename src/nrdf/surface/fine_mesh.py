@@ -14,6 +14,7 @@ from nrdf.geometry.mesh import triangle_areas, triangle_crosses
 MOST_FACES = 50_000
 """Faces of a refined mesh, about; larger regions are planned in larger triangles."""
 _ROUNDS, _FLIPS, _FIRST_FLIPS = 24, 3, 12
+_FEW = 0.02  # share of the faces that may have edges to turn still
 _OF_SQUARE = 0.11  # of a square on the longest edge, what a triangle has about
 _FLAT = 3e-7  # of the mesh's extent: two triangles that lie so flat are one face, cut anyhow
 
@@ -145,10 +146,7 @@ def refine(
     area = float(triangle_areas(vertices, faces[wanted]).sum())
     edge_m = max(edge_m, float(np.sqrt(area / (_OF_SQUARE * most_faces))))
     flat = _FLAT * float(np.ptp(vertices, axis=0).max())
-    for _ in range(_FIRST_FLIPS):
-        faces, changed = _flipped(vertices, faces, flat, wanted)
-        if changed <= 0.01 * len(faces):
-            break
+    faces = _all_flipped(vertices, faces, flat, wanted, _FIRST_FLIPS)
     finished: list[tuple[np.ndarray, np.ndarray]] = []
     for _ in range(_ROUNDS):
         # Only faces with a long edge change, and that edge is long for both of its faces.
@@ -169,13 +167,10 @@ def refine(
         vertices = np.concatenate([vertices, vertices[pairs[long]].mean(axis=1)])
         faces, source = split_edges(faces[busy], middle[of_face[busy]], vertices)
         origin = origin[busy][source]
-        faces, _ = _flipped(vertices, faces, flat, wanted[origin])
+        faces = _all_flipped(vertices, faces, flat, wanted[origin], 1)
     finished.append((faces, origin))
     faces, origin = (np.concatenate(kind) for kind in zip(*finished, strict=True))
-    for _ in range(_FLIPS):
-        faces, changed = _flipped(vertices, faces, flat, wanted[origin])
-        if changed <= 0.01 * len(faces):
-            break
+    faces = _all_flipped(vertices, faces, flat, wanted[origin], _FLIPS)
     return FineMesh(vertices, faces, origin, edge_m)
 
 
@@ -277,15 +272,35 @@ class _Inner:
         return _Inner(inner, np.stack([f, g], axis=1), corners, flat, height, doubles)
 
 
+def _all_flipped(
+    vertices: np.ndarray, faces: np.ndarray, flat: float, kind: np.ndarray, rounds: int
+) -> np.ndarray:
+    """Faces (f, 3) after some rounds of `_flipped`, fewer where hardly anything is left to turn."""
+    faces, asked = _flipped(vertices, faces, flat, kind, np.ones(len(faces), bool))
+    for _ in range(rounds - 1):
+        if asked.sum() <= _FEW * len(faces):
+            break
+        # Edges change with the faces beside them, and all faces around tell which edges there are.
+        touched = np.zeros(len(vertices), bool)
+        touched[faces[asked]] = True
+        near = np.flatnonzero(touched[faces].any(axis=1))
+        faces[near], again = _flipped(vertices, faces[near], flat, kind[near], asked[near])
+        asked = np.zeros(len(faces), bool)
+        asked[near[again]] = True
+    return faces
+
+
 def _flipped(
-    vertices: np.ndarray, faces: np.ndarray, flat: float, kind: np.ndarray
-) -> tuple[np.ndarray, int]:
-    """Faces (f, 3) with edges between flat neighbours of one kind (f,) turned where that makes them
-    less thin, and how many were: Delaunay's criterion, for edges that share no triangle."""
+    vertices: np.ndarray, faces: np.ndarray, flat: float, kind: np.ndarray, wanted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Faces (f, 3) with edges between flat neighbours of one kind (f,), of which one at least is
+    wanted (f,), turned where that makes them less thin: Delaunay's criterion, for edges that share
+    no triangle. Returns them, and those (f,) that changed or had no turn yet."""
     edges = _Edges.of(faces)
     inner = _Inner.of(vertices, faces, edges, flat)
-    alike = kind[inner.faces[:, 0]] == kind[inner.faces[:, 1]]
-    asked = np.flatnonzero(inner.flat & alike)
+    one, other = inner.faces.T
+    asked = np.flatnonzero(inner.flat & (kind[one] == kind[other]) & (wanted[one] | wanted[other]))
+    busy = np.zeros(len(faces), bool)
     pa, pb, pc, pd = (vertices[corner] for corner in inner.corners[asked].T)
     # The angles across the edge: their tangents are those of twice an area and a product.
     one = np.einsum("ea,ea->e", pa - pc, pb - pc)
@@ -294,7 +309,7 @@ def _flipped(
     wide = np.arctan2(size, one) + np.arctan2(other_size, other)
     chosen, wide = asked[wide > np.pi + 1e-6], wide[wide > np.pi + 1e-6]
     if not len(chosen):
-        return faces, 0
+        return faces, busy
     # An edge that is there already would get more than two faces.
     count = int(faces.max()) + 1
     c, d = np.sort(inner.corners[chosen, 2:].astype(np.int64), axis=1).T
@@ -312,11 +327,12 @@ def _flipped(
     np.minimum.at(taken, f, rank)
     np.minimum.at(taken, g, rank)
     free = (taken[f] == rank) & (taken[g] == rank)
+    busy[f], busy[g] = True, True
     a, b, c, d = inner.corners[chosen[free]].T
     faces = faces.copy()
     faces[f[free]] = np.stack([a, d, c], axis=1)
     faces[g[free]] = np.stack([d, b, c], axis=1)
-    return faces, int(free.sum())
+    return faces, busy
 
 
 def _length(rows: np.ndarray) -> np.ndarray:

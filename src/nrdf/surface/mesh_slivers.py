@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -21,34 +23,64 @@ def without_slivers(
     origin: (f,), where each face came from. Returns vertices, faces and origins.
     """
     size = float(np.ptp(vertices, axis=0).max())
+    bad = _Thin.of(vertices, faces, size).any
     for _ in range(_ROUNDS):
-        corners = vertices[faces]
-        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        double = np.linalg.norm(triangle_crosses(vertices, faces), axis=1)
-        short = sides < _SHORT * size
-        flat = double < _FLAT * size * sides.max(axis=1)
-        if short.any():
-            faces, origin = _merged(faces, origin, short, len(vertices))
-        elif flat.any():
-            before = len(faces)
-            faces, origin, changed = _flipped(faces, origin, flat, sides.argmax(axis=1))
-            if not changed and len(faces) == before:
-                break
-        else:
+        if not bad.any():
             break
+        # Only these change, and faces around them.
+        touched = np.zeros(len(vertices), bool)
+        touched[faces[bad]] = True
+        near = touched[faces].any(axis=1)
+        around, sources = faces[near], origin[near]
+        thin = _Thin.of(vertices, around, size)
+        before, changed = len(around), 0
+        if thin.short.any():
+            around, sources = _merged(around, sources, thin.short)
+        else:
+            around, sources, changed = _flipped(around, sources, thin.flat, thin.longest)
+        if not changed and len(around) == before:
+            break
+        faces = np.concatenate([faces[~near], around])
+        origin = np.concatenate([origin[~near], sources])
+        bad = np.zeros(len(faces), bool)
+        bad[len(faces) - len(around) :] = _Thin.of(vertices, around, size).any
     return vertices, faces, origin
 
 
+@dataclass(frozen=True)
+class _Thin:
+    """Which sides (f, 3) of faces are short; which faces (f,) are flat, and which of their sides
+    are the longest (f,)."""
+
+    short: np.ndarray
+    flat: np.ndarray
+    longest: np.ndarray
+
+    @staticmethod
+    def of(vertices: np.ndarray, faces: np.ndarray, size: float) -> _Thin:
+        corners = vertices[faces]
+        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        double = np.linalg.norm(triangle_crosses(vertices, faces), axis=1)
+        flat = double < _FLAT * size * sides.max(axis=1)
+        return _Thin(sides < _SHORT * size, flat, sides.argmax(axis=1))
+
+    @property
+    def any(self) -> np.ndarray:
+        return np.asarray(self.flat | self.short.any(axis=1))
+
+
 def _merged(
-    faces: np.ndarray, origin: np.ndarray, short: np.ndarray, count: int
+    faces: np.ndarray, origin: np.ndarray, short: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """With the ends of short edges (f, 3) as one."""
-    one, two = faces[short], np.roll(faces, -1, axis=1)[short]
-    links = coo_matrix((np.ones(len(one), bool), (one, two)), (count, count))
+    used, local = np.unique(faces, return_inverse=True)
+    local = local.reshape(-1, 3)
+    one, two = local[short], np.roll(local, -1, axis=1)[short]
+    links = coo_matrix((np.ones(len(one), bool), (one, two)), (len(used), len(used)))
     label = connected_components(links, directed=False)[1]
     first = np.zeros(int(label.max()) + 1, np.int64)
-    first[label] = np.arange(count)
-    faces = first[label][faces]
+    first[label] = np.arange(len(used))
+    faces = used[first[label][local]]
     good = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return faces[good], origin[good]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import igl
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array
+from scipy.sparse import csc_matrix, csr_matrix, diags_array
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
@@ -29,7 +30,7 @@ _CROWDED = 0.3  # of the spacing that points have if they lie evenly, at least
 _SIDE = 4.0  # spacings that opposite normals are apart
 _FAR = 2.0  # spacings from the middles of faces, from where a vote says nothing
 _STEEPEST = 30.0  # cotangent: thinner triangles conduct no better
-_ROUNDS, _ACCURACY = 120, 2e-3  # of conjugate gradients
+_HELD = 1e-9  # share of the diagonal that is added to it
 
 
 @dataclass(frozen=True)
@@ -113,10 +114,14 @@ def cut_at_borders(
 def _level(values: np.ndarray, number: int, allow_overlap: bool) -> np.ndarray:
     """A function of memberships (..., r) that is positive inside a region."""
     own = values[..., number]
-    if allow_overlap or values.shape[-1] == 1:
-        return np.asarray(own - LEVEL)
-    other = np.delete(values, number, axis=-1).max(axis=-1)
-    return np.asarray(np.minimum(own - LEVEL, own - other))
+    level = own - LEVEL
+    if not allow_overlap:
+        # Where the region has no say, others have none in it.
+        there = (level > 0.0).any(axis=tuple(range(1, level.ndim)))
+        for other in range(values.shape[-1]):
+            if other != number:
+                level[there] = np.minimum(level[there], own[there] - values[there, ..., other])
+    return np.asarray(level)
 
 
 def smooth_memberships(fine: FineMesh, votes: Votes, reach: float) -> np.ndarray:
@@ -145,10 +150,7 @@ def smooth_memberships(fine: FineMesh, votes: Votes, reach: float) -> np.ndarray
     weight = votes.spacing**2
     system = csr_matrix(weight * (at.T @ at) + reach**2 * (_conductance(smooth) + bridge))
     heat = weight * (at.T @ votes.membership[told])
-    start = np.zeros((count, votes.membership.shape[1]))
-    known = np.asarray(at.sum(axis=0)).ravel()
-    start[known > 0] = heat[known > 0] / (weight * known[known > 0, None])
-    found = np.clip(_solved(system, heat, start), 0.0, 1.0)
+    found = np.clip(_solved(system, heat), 0.0, 1.0)
     return np.asarray(found[corners])
 
 
@@ -199,27 +201,13 @@ def _conductance(fine: FineMesh) -> csr_matrix:
     return csr_matrix(diags_array(np.asarray(joined.sum(axis=1)).ravel()) - joined)
 
 
-def _solved(system: csr_matrix, right: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Solution (v, r) of a positive definite system by conjugate gradients, all sides at once."""
-    # Single precision is far finer than the accuracy, and takes half the time.
-    unit = max(float(system.diagonal().mean()), 1e-300)
-    system = (system / unit).astype(np.float32)
-    right = (right / unit).astype(np.float32)
-    scale = 1.0 / np.maximum(system.diagonal(), 1e-30)[:, None]
-    found = start.astype(np.float32)
-    rest = right - system @ found
-    way = scale * rest
-    size = np.einsum("vr,vr->r", rest, way)
-    goal = _ACCURACY**2 * np.maximum(np.einsum("vr,vr->r", right, scale * right), 1e-30)
-    for _ in range(_ROUNDS):
-        if (size <= goal).all():
-            break
-        pushed = system @ way
-        step = size / np.maximum(np.einsum("vr,vr->r", way, pushed), 1e-30)
-        found = found + step * way
-        rest = rest - step * pushed
-        turned = scale * rest
-        new = np.einsum("vr,vr->r", rest, turned)
-        way = turned + new / np.maximum(size, 1e-30) * way
-        size = new
-    return np.asarray(found, np.float64)
+def _solved(system: csr_matrix, right: np.ndarray) -> np.ndarray:
+    """Solution (v, r) of a symmetric positive system; 0 where nothing is said."""
+    # Parts without votes have no solution of their own.
+    held = _HELD * float(system.diagonal().mean()) * np.ones(system.shape[0])
+    symmetric = {"SymmetricMode": True}
+    factors = splu(
+        csc_matrix(system + diags_array(held)), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+        options=symmetric,
+    )  # fmt: skip
+    return np.asarray(factors.solve(right))

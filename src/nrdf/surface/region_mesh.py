@@ -109,7 +109,7 @@ def region_meshes(
         return RegionMeshes({}, left_out)
     there = [name for name in memberships if name not in left_out]
     cut = cut_at_borders(target, votes, min(tool_radius_m[name] for name in there), allow_overlap)
-    pieces = Pieces(cut.mesh)
+    pieces = Pieces(cut.mesh, cut.inside)
     footprint = {name: np.pi * tool_radius_m[name] ** 2 for name in there}
     changes: dict[str, list[str]] = {name: [] for name in there}
     inside: dict[str, np.ndarray] = {}
