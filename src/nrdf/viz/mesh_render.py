@@ -110,6 +110,11 @@ class MeshScene:
         share = rng.dirichlet(np.ones(3), _SAMPLES)
         return face, np.einsum("mk,mka->ma", share, self.corners[face])
 
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        """x, y and z (3, 3 f) of all first corners, all second and all third ones."""
+        return np.ascontiguousarray(self.corners.transpose(2, 1, 0)).reshape(3, -1)
+
     @property
     def points(self) -> np.ndarray:
         """Places (m, 3) on the surface, by area."""
@@ -146,8 +151,10 @@ class MeshScene:
         number, the last for none; line_colours: the same for lines.
         """
         shape, pixels = (OVERSAMPLING * shape[0], OVERSAMPLING * shape[1]), OVERSAMPLING * pixels
-        view = (self.corners.reshape(-1, 3) @ axes.T).reshape(-1, 3, 3)
-        view[..., :2] = (view[..., :2] - corner) * pixels
+        # x, y and z of each corner in rows of their own: what follows is bound by memory.
+        view = axes @ self._columns
+        view[:2] = (view[:2] - np.asarray(corner)[:, None]) * pixels
+        view = view.reshape(3, 3, -1)
         layer = _LAYER * (self.face_region + 1.0)
         face, depth = _rasterised(view, layer, shape)
         image = np.ones((*shape, 3), np.float32)
@@ -171,7 +178,7 @@ class MeshScene:
         table: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
         """Colours (m, 3) of faces (m,) at pixels (m, 2)."""
-        a, b, c = (view[face, k, :2] for k in range(3))
+        a, b, c = (view[:2, k, face].T for k in range(3))
         whole = _cross(b - a, c - a)
         weight = np.stack([_cross(b - at, c - at), _cross(c - at, a - at)], axis=1)
         weight = np.clip(weight / whole[:, None], 0.0, 1.0)
@@ -195,19 +202,20 @@ def _rasterised(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The nearest face at each pixel's middle, -1 for none, and its depth, -inf, both `shape`.
 
-    view: (f, 3, 3), x and y in pixels, z towards the viewer; layer: (f,), added to the depth of
+    view: (3, 3, f), x and y in pixels, z towards the viewer, of each corner; layer: (f,), added to the depth of
     faces that look this way where two meet.
     """
-    # A row of its own for each coordinate of each corner: what follows is bound by memory.
-    x, y, z = np.ascontiguousarray(view.transpose(2, 1, 0))
-    low = np.ceil(np.maximum(y.min(axis=0) - 0.5, 0.0)).astype(np.int64)
-    high = np.floor(np.minimum(y.max(axis=0) - 0.5, shape[0] - 1.0)).astype(np.int64)
+    # Most triangles of a fine mesh lie beyond the window, or between the middles of two rows.
+    x, y, z = view
+    low = np.ceil(np.maximum(y.min(axis=0) - 0.5, 0.0))
+    high = np.floor(np.minimum(y.max(axis=0) - 0.5, shape[0] - 1.0))
+    drawn = np.flatnonzero((high >= low) & (x.max(axis=0) >= 0.0) & (x.min(axis=0) <= shape[1]))
+    x, y, z = (one[:, drawn] for one in (x, y, z))
+    low, high = low[drawn].astype(np.int64), high[drawn].astype(np.int64)
     twice = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
-    within = (x.max(axis=0) >= 0.0) & (x.min(axis=0) <= shape[1])
-    drawn = np.flatnonzero(within & (high >= low) & (np.abs(twice) > 1e-9))
-    x, y, z = (np.ascontiguousarray(one[:, drawn]) for one in (x, y, z))
-    twice, low = twice[drawn], low[drawn]
-    face, row = counted(high[drawn] - low + 1, low)
+    rows = np.where(np.abs(twice) > 1e-9, high - low + 1, 0)
+    twice = np.where(rows > 0, twice, 1.0)
+    face, row = counted(rows, low)
     # Along a row, a triangle reaches from its longest edge upwards to one of the two others.
     order = y.argsort(axis=0)
     (xa, xb, xc), (ya, yb, yc) = (np.take_along_axis(one, order, axis=0) for one in (x, y))
