@@ -52,7 +52,7 @@ def estimate_normals(
         toward = sensor_direction_sum(points, None, sensors, spacing)
     toward /= np.linalg.norm(toward, axis=1, keepdims=True) + 1e-6
     same_side = np.maximum(np.einsum("nka,na->nk", toward[index], toward), 0.01) ** 2
-    normals = _principal_normals(points, index, closeness * same_side)
+    normals = principal_normals(points, index, closeness * same_side)
 
     if sensors is None:
         toward = view_direction_sum(points, normals, fibonacci_directions(directions), spacing, 0.4)
@@ -61,11 +61,11 @@ def estimate_normals(
     else:
         toward = sensor_direction_sum(points, normals, sensors, spacing)
     sign = np.einsum("na,na->n", toward, normals)
-    sign = _consensus(sign, points, normals, index, closeness, 0.25 * spacing)
+    sign = consensus(sign, points, normals, index, closeness, 0.25 * spacing)
     return np.where(sign < 0.0, -1.0, 1.0)[:, None] * normals.astype(np.float64)
 
 
-def _principal_normals(points: np.ndarray, index: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def principal_normals(points: np.ndarray, index: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Unit normals (n, 3), sign arbitrary, of neighbourhoods `index` with `weight` (n, k)."""
     weight = weight / weight.sum(axis=1, keepdims=True)
     offset = points[index]
@@ -74,7 +74,7 @@ def _principal_normals(points: np.ndarray, index: np.ndarray, weight: np.ndarray
     return np.linalg.eigh(scatter)[1][:, :, 0]
 
 
-def _consensus(
+def consensus(
     sign: np.ndarray,
     points: np.ndarray,
     normals: np.ndarray,

@@ -125,10 +125,8 @@ class ProcessTransfer:
             target_warnings = unit_warnings
             for warning in (*unit_warnings, *kind.warnings):
                 log.warning("%s", warning)
-        cloud = with_normals(encoded)
-        complete = cloud if whole is None else with_normals_of(whole, cloud)
-        with ThreadPoolExecutor(1) as pool:
-            meshing = pool.submit(_surface_or_reason, complete, self.bound_knowledge)
+        with ThreadPoolExecutor(2) as pool:
+            meshing = pool.submit(_mesh_or_reason, encoded, whole, self.bound_knowledge)
             matches = self.reference.retrieve_all(regions, encoded, check=False)
             matches |= _marked_matches(marked or {}, matches, encoded)
             found = {
@@ -136,15 +134,17 @@ class ProcessTransfer:
             }
             seconds = {"regions": time.perf_counter() - start}
             start = time.perf_counter()
-            surface, fault = meshing.result()
-        found = self._on_mesh(found, encoded, surface, fault)
+            complete, surface, fault = meshing.result()
+            skin = None if surface is None else surface.skin
+            comparing = pool.submit(lambda: given or given_surface(complete, skin))
+            found = self._on_mesh(found, encoded, surface, fault)
+            compared = comparing.result()
+        cloud = complete if whole is None else with_normals_of(encoded.cloud, complete)
         seconds["surface"] = time.perf_counter() - start
         start = time.perf_counter()
         correspondence = Correspondence(self.reference_surface, encoded)
         up = np.eye(3)[1] if encoded.pose is None else encoded.pose.rotation[:, 1]
-        if given is None:
-            given = given_surface(complete, None if surface is None else surface.skin)
-        target_paths = TargetPaths(self.reference_paths, correspondence, given, up)
+        target_paths = TargetPaths(self.reference_paths, correspondence, compared, up)
         paths = target_paths.all(self.steps(), found, progress)
         seconds["tool paths"] = time.perf_counter() - start
         shared = overlaps({n: r.match.indices for n, r in found.items() if not r.missing})
@@ -215,14 +215,19 @@ class ProcessTransfer:
         return placed
 
 
-def _surface_or_reason(
-    cloud: PointCloud, bound_knowledge: BoundKnowledge
-) -> tuple[ObjectSurface | None, str]:
-    """An object's mesh, or why there is none."""
+def _mesh_or_reason(
+    encoded: EncodedCloud, whole: PointCloud | None, bound_knowledge: BoundKnowledge
+) -> tuple[PointCloud, ObjectSurface | None, str]:
+    """All points of a target with normals, by those that the field works with; the target's mesh,
+    or why there is none."""
+    few = PointCloud(
+        encoded.original(encoded.points), encoded.original_normals(encoded.normals), unit="m"
+    )
+    complete = with_normals_of(encoded.cloud if whole is None else whole, few)
     try:
-        return object_surface(cloud, bound_knowledge.knowledge), ""
+        return complete, object_surface(complete, bound_knowledge.knowledge), ""
     except ProcessError as error:
-        return None, str(error)
+        return complete, None, str(error)
 
 
 def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTransfer:
@@ -266,11 +271,3 @@ def _marked_matches(
             working=encoded.to_working(indices),
         )
     return matches
-
-
-def with_normals(encoded: EncodedCloud) -> PointCloud:
-    """The whole cloud of an encoded one, with the normals that the field works with."""
-    if encoded.cloud.normals is not None:
-        return encoded.cloud
-    normals = encoded.original_normals(encoded.normals)
-    return replace(encoded.cloud, normals=normals[encoded.nearest_working])

@@ -17,8 +17,10 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames, unit_vectors
+from nrdf.geometry.mesh import row_keys
 from nrdf.geometry.quadrics import quadrics
 from nrdf.io.cloud import PointCloud
+from nrdf.surface.dense_normals import dense_normals
 from nrdf.surface.target_mesh import TargetMesh
 
 log = logging.getLogger(__name__)
@@ -65,12 +67,11 @@ def given_surface(cloud: PointCloud, mesh: TargetMesh | None = None) -> GivenSur
 
 
 def with_normals_of(whole: PointCloud, cloud: PointCloud) -> PointCloud:
-    """A cloud with the normals of the nearest points of another one, where it has none of its
-    own."""
+    """A cloud with normals by those of another one, where it has none of its own."""
     if whole.normals is not None or cloud.normals is None:
         return whole
-    nearest = cKDTree(cloud.points).query(whole.points)[1]
-    return replace(whole, normals=cloud.normals[nearest])
+    normals = dense_normals(whole.points, cloud.points, cloud.normals, whole.sensors)
+    return replace(whole, normals=normals)
 
 
 class MeshSurface:
@@ -109,12 +110,9 @@ class PointSurface:
     def __init__(self, points: np.ndarray, normals: np.ndarray) -> None:
         self.name = f"all {len(points)} points as given"
         # Merged scans repeat points, which then have no distance to their neighbours.
-        once = np.unique(np.hstack([points, normals]), axis=0, return_index=True)[1]
+        once = np.unique(row_keys(np.hstack([points, normals])), return_index=True)[1]
         self._points, self._normals = points[once], normals[once]
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self._points)
+        self._tree = cKDTree(self._points, balanced_tree=False, compact_nodes=False)
 
     @cached_property
     def resolution_m(self) -> float:

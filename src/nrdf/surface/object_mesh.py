@@ -47,7 +47,8 @@ def _of_points(cloud: PointCloud, edge_m: float) -> TargetMesh:
     points, normals = cloud.points, cloud.normals
     mesh = mesh_from_scan(points, normals, edge_m)
     some = np.linspace(0, len(points) - 1, min(_ASKED, len(points))).astype(int)
-    away = cKDTree(points).query(points[some], [_NEIGHBOURS + 1])[0]
+    tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
+    away = tree.query(points[some], [_NEIGHBOURS + 1])[0]
     spacing = float(np.median(away)) * np.sqrt(np.pi / _NEIGHBOURS)
     if spacing <= _SPARSE * edge_m or mesh.border_length <= _CRACKED * spacing:
         return mesh

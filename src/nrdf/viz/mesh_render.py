@@ -202,8 +202,8 @@ def _rasterised(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The nearest face at each pixel's middle, -1 for none, and its depth, -inf, both `shape`.
 
-    view: (3, 3, f), x and y in pixels, z towards the viewer, of each corner; layer: (f,), added to the depth of
-    faces that look this way where two meet.
+    view: (3, 3, f), of each corner x and y in pixels and z towards the viewer; layer: (f,), added
+    to the depth of faces that look this way where two meet.
     """
     # Most triangles of a fine mesh lie beyond the window, or between the middles of two rows.
     x, y, z = view
