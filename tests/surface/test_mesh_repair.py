@@ -57,3 +57,29 @@ def test_random_triangles_are_refused_at_once():
     faces = np.array([rng.choice(50, 3, replace=False) for _ in range(5000)])
     with pytest.raises(DataError, match=r"a straight line through it meets .* no surface"):
         repaired_skin(rng.random((50, 3)), faces)
+
+
+def tube(way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of a closed tube around a way (n, 3), 0.2 wide."""
+    along = np.gradient(way, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.cross(along, [0.0, 0.0, 1.0])
+    ring = [across, np.cross(along, across), -across, -np.cross(along, across)]
+    vertices = np.stack([way + 0.1 * side for side in ring], axis=1).reshape(-1, 3)
+    one = np.array([(k, (k + 1) % 4, k + 4, (k + 1) % 4 + 4) for k in range(4)])
+    sides = one[:, [[0, 1, 2], [1, 3, 2]]].reshape(-1, 3)
+    steps = 4 * np.arange(len(way) - 1)[:, None, None]
+    last = len(vertices)
+    ends = np.array(
+        [[1, 0, 2], [2, 0, 3], [last - 4, last - 3, last - 2], [last - 4, last - 2, last - 1]]
+    )
+    return vertices, np.concatenate([(sides + steps).reshape(-1, 3), ends])
+
+
+@pytest.mark.parametrize(("height", "crossing"), [(0.0, True), (0.4, False)])
+def test_a_part_that_crosses_itself_is_said(height, crossing):
+    """A tube in the form of an eight, in one part, flat or with one bow above the other."""
+    turn = np.linspace(-0.5, 1.6 * np.pi, 80)
+    way = np.stack([np.sin(turn), 0.5 * np.sin(2.0 * turn), height * np.cos(turn)], axis=1)
+    said = repaired_skin(*tube(way))[2]
+    assert any("crosses itself" in line for line in said) == crossing

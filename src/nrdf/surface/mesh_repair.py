@@ -26,6 +26,7 @@ from nrdf.surface.mesh_union import united
 _VIEWED = 20_000  # points of the skin that say which way its parts look
 _OFF = 1e-4  # longest sides above a face from where it is asked whether that is inside
 _INSIDE = 0.6  # winding number from which a place is inside; half-way is on the surface
+_WIDE, _MOST_ASKED = 10.0, 1_500  # radii that a face has at least; faces that stand for all
 _NOTHING = 1e-6  # longest sides squared, an area that is not worth a word
 _CROSSINGS = 12  # of a ray with the surface
 _PLACES = np.array(
@@ -79,12 +80,18 @@ def repaired_skin(
         repairs.append(
             f"{made.parts} parts united, of which others covered {1e4 * made.covered:.3g} cm²"
         )
+    repairs += [made.left] if made.left else []
     vertices, faces = made.vertices, made.faces
     hidden = hidden_faces(vertices, faces)
     if hidden.all():
         raise DataError("no face of the mesh can be reached from outside")
     if hidden.any():
         repairs.append(_said(int(hidden.sum()), "inside the object", "removed"))
+    if crossing := _crossing(vertices, faces, hidden):
+        repairs.append(
+            f"{_said(crossing, 'that cross', 'others')} of the object left as they are: the mesh "
+            "crosses itself there"
+        )
     faces = faces[~hidden]
     used = len(np.unique(faces))
     vertices, faces = sheets_apart(vertices, faces)
@@ -118,6 +125,27 @@ def hidden_faces(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         places = corners[hidden].mean(axis=1) + above[hidden]
         hidden[hidden] = MeshWindingNumber(vertices, faces)(places) > _INSIDE
     return hidden
+
+
+def _crossing(vertices: np.ndarray, faces: np.ndarray, hidden: np.ndarray) -> int:
+    """How many faces that are not hidden (f,) are inside the object in part, of a mesh in which
+    parts that cross each other were united: about, where there are many faces."""
+    corners = vertices[faces]
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).sum(axis=1)
+    crosses = triangle_crosses(vertices, faces)
+    off = _OFF * float(np.ptp(vertices, axis=0).max())
+    # A place above a small face by an inner corner is in the wall beside it.
+    large = np.linalg.norm(crosses, axis=1) > _WIDE * off * sides
+    able = np.flatnonzero(large & ~hidden)
+    asked = able[np.linspace(0, len(able) - 1, min(_MOST_ASKED, len(able))).astype(int)]
+    if not len(asked):
+        return 0
+    above = off * unit_vectors(crosses[asked])
+    weights = _PLACES[:4] / _PLACES[:4].sum(axis=1, keepdims=True)
+    places = np.einsum("pc,fca->pfa", weights, corners[asked]) + above
+    winding = MeshWindingNumber(vertices, faces)(places.reshape(-1, 3)).reshape(4, -1)
+    inside = (winding > _INSIDE).any(axis=0)
+    return round(int(inside.sum()) * len(able) / len(asked))
 
 
 def _leaving(

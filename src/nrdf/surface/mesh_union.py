@@ -28,6 +28,7 @@ _UNNAMED = 1 << 30  # numbers from here on are of faces that the mesh does not h
 _MOST_PARTS = 2000  # of a mesh; one with more is left as it is
 _ROUNDS = 4  # of unions, each with fewer parts than the one before
 _SEEN_LOST = 5e-4  # share of the places seen from outside that a union may lose
+_ODD = "their surfaces are not sound enough to be united"
 _WITHIN = 0.5  # winding number within a capped part
 
 
@@ -35,13 +36,14 @@ _WITHIN = 0.5  # winding number within a capped part
 class United:
     """vertices (v, 3), outward faces (f, 3) and the face (f,) that each is a piece of.
     covered: area that other parts covered, in the vertices' unit squared; parts: how many there
-    were."""
+    were. left: why parts were left as they are, in words; empty where all were united."""
 
     vertices: np.ndarray
     faces: np.ndarray
     origin: np.ndarray
     covered: float
     parts: int
+    left: str = ""
 
 
 def united(vertices: np.ndarray, faces: np.ndarray) -> United:
@@ -57,7 +59,10 @@ def united(vertices: np.ndarray, faces: np.ndarray) -> United:
     vertices, faces, source = crowded_edges_divided(vertices, faces)
     origin = origin[source]
     parts = _parts(vertices, faces)
-    if not 1 < len(parts) <= _MOST_PARTS:
+    if len(parts) > _MOST_PARTS:
+        left = f"{len(parts)} parts left as they overlap: at most {_MOST_PARTS} are united"
+        return replace(given, left=left)
+    if len(parts) == 1:
         return given
     bodies = [_body(vertices, part, _CAP) for part in parts]
     seen = Seen.of(vertices, faces, np.random.default_rng(0))
@@ -76,13 +81,17 @@ def united(vertices: np.ndarray, faces: np.ndarray) -> United:
                 - float(triangle_areas(made.vertices, made.faces).sum()),
                 0,
             )
-            return replace(made, origin=origin[made.origin], covered=float(covered))
+            odd = sum(body.solid is None and body.sheet is None for body in bodies)
+            left = f"{odd} of {len(parts)} parts left as they overlap: {_ODD}" if odd else ""
+            return replace(made, origin=origin[made.origin], covered=float(covered), left=left)
         hiding = _hiding(bodies, seen.points[lost], own[lost])
         for number in hiding:
             bodies[number] = _body(vertices, parts[number], 0.0)
         for number in [] if hiding else np.unique(own[lost]):
             bodies[number] = _Body(parts[number], None, None)
-    return given
+    if all(body.solid is None for body in bodies):
+        return given  # open sheets cover nothing
+    return replace(given, left=f"{len(parts)} parts left as they overlap: {_ODD}")
 
 
 @dataclass(frozen=True)
