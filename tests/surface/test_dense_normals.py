@@ -21,7 +21,7 @@ def test_sides_of_a_slat_thinner_than_the_few_points_are_apart():
     nearest = normals[((points[:, None] - few) ** 2).sum(axis=2).argmin(axis=1)]
     found = dense_normals(points, few, normals)
     assert (np.einsum("na,na->n", nearest, truth) < 0.0).mean() > 0.1
-    assert (np.einsum("na,na->n", found, truth) < 0.0).mean() < 0.003
+    assert (np.einsum("na,na->n", found, truth) < 0.0).mean() < 0.01
     assert (np.einsum("na,na->n", found, truth) < 0.5).mean() < 0.03
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nrdf.commands.console import console, errors, show, table, versions
@@ -10,6 +11,7 @@ from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count, NonNegativeCount
 
 if TYPE_CHECKING:
+    from nrdf_benchmark.speed.large import LargeTransfer
     from nrdf_benchmark.speed.measure import Failure
     from nrdf_benchmark.speed.retrieval import RetrievalSpeed
     from nrdf_benchmark.speed.training import TrainingSpeed
@@ -39,6 +41,8 @@ def speed(
         out: JSON file to write.
     """
     from nrdf.io.atomic import write_json
+    from nrdf_benchmark.speed.common import in_new_process
+    from nrdf_benchmark.speed.large import KINDS, measure_large
     from nrdf_benchmark.speed.measure import measure, to_json
     from nrdf_benchmark.speed.transfer import measure_transfer
 
@@ -46,10 +50,16 @@ def speed(
         retrieval, training, failures = measure(preset, device, repeats, steps, status.update)
         status.update("transfer")
         transfer = measure_transfer(device, repeats)
+        large = []
+        for kind, what in KINDS.items():
+            status.update(f"transfer to {what}")
+            large.append(in_new_process(measure_large, kind, device))
     show_speeds(retrieval, training, failures)
     show_transfer_speed(transfer)
+    show_large_transfers(large)
     if out is not None:
         content = {**to_json(retrieval, training, failures), "transfer": vars(transfer)}
+        content["large"] = [vars(one) for one in large]
         write_json(out, {"versions": versions(), **content})
         console.print(f"wrote {out}")
 
@@ -64,6 +74,23 @@ def show_transfer_speed(transfer: TransferSpeed) -> None:
     for phase, seconds in transfer.phases.items():
         shown.add_row(f"  {phase}", f"{seconds:.2f}", "")
     shown.add_row("CPU time, all threads", f"{transfer.cpu_s:.2f}", "")
+    show(shown)
+
+
+def show_large_transfers(large: Sequence[LargeTransfer]) -> None:
+    """A table of transfers to fine meshes and dense scans."""
+    from nrdf_benchmark.speed.large import BARS, KINDS
+
+    shown = table("\ntransfer, 8 regions", "", *(KINDS[one.kind] for one in large), "must keep to")
+    rows = {
+        "further targets, all files, s": ("wall_s", 1.0),
+        "CPU time, all threads, s": ("cpu_s", 1.0),
+        "nrdf transfer, cold shell, s": ("command_s", 1.0),
+        "peak memory, GB": ("peak_memory_bytes", 1e9),
+    }
+    for title, (name, unit) in rows.items():
+        values = (f"{getattr(one, name) / unit:.1f}" for one in large)
+        shown.add_row(title, *values, f"{BARS[name] / unit:g}" if name in BARS else "")
     show(shown)
 
 
