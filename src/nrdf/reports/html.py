@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from nrdf.geometry.units import readable
 from nrdf.io.atomic import write_atomically
+from nrdf.reports.result_report import histogram, result_lines
 from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
+from nrdf.viz.heat_map import HeatMap
 from nrdf.viz.palette import region_colours
 
 
@@ -32,13 +34,17 @@ def html_text(template: str, content: Mapping[str, Any]) -> str:
 
 
 def write_transfer_html(
-    path: Path, report: Mapping[str, Any], picture: Path, details: Mapping[str, np.ndarray]
+    path: Path,
+    report: Mapping[str, Any],
+    picture: Path,
+    details: Mapping[str, np.ndarray],
+    heat_maps: Sequence[HeatMap | None] = (),
 ) -> None:
     """Write the HTML report of a transfer.
 
     report: from `transfer_report`, with title and seconds. picture: file of the whole target's
-    picture. details: by region, a close picture (h, w, 3) with values in [0, 1]. Raises OutputError
-    if the file cannot be written.
+    picture. details: by region, a close picture (h, w, 3) with values in [0, 1]. heat_maps: of
+    each path's result, where it has one. Raises OutputError if the file cannot be written.
     """
     colours = {
         name: "#" + "".join(f"{round(255 * c):02x}" for c in colour)
@@ -55,6 +61,7 @@ def write_transfer_html(
         "columns": list(METRIC_COLUMNS),
         "cells": metric_cells,
         "properties": lambda path: _properties(path, report["regions"][path["region"]]),
+        "results": _results(report, heat_maps),
         "surface": _surface(report["surface"]),
         "seconds": ", ".join(f"{name} {value:.2f} s" for name, value in report["seconds"].items()),
         "versions": [versions] if versions else [],
@@ -98,6 +105,27 @@ def _png_source(image: np.ndarray) -> str:
     file = io.BytesIO()
     imsave(file, (255 * image).astype(np.uint8), format="png")
     return _data_source(file.getvalue(), "png")
+
+
+def _results(
+    report: Mapping[str, Any], heat_maps: Sequence[HeatMap | None]
+) -> list[dict[str, Any]]:
+    """Of each path with a target: its name, lines, picture and histogram."""
+    made = []
+    for path, drawn in zip(report["paths"], heat_maps, strict=False):
+        content = path.get("result")
+        if content is None or drawn is None:
+            continue
+        bars = histogram(drawn.shares, content["target_m"], content["tolerance_m"])
+        made.append(
+            {
+                "name": f"{path['region']}: {path['process']}",
+                "lines": result_lines(content),
+                "picture": _png_source(drawn.image),
+                "bars": bars,
+            }
+        )
+    return made
 
 
 def _header(report: Mapping[str, Any]) -> list[str]:

@@ -25,6 +25,7 @@ from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
 from nrdf.reports.html import write_transfer_html
 from nrdf.reports.job_meshes import write_job_meshes
+from nrdf.reports.result_report import result_heat_maps
 from nrdf.reports.transfer_report import transfer_report
 from nrdf.toolpath.file import write_toolpaths
 from nrdf.toolpath.tool_segments import contact_points
@@ -94,7 +95,8 @@ def write_job_files(
     report = {"title": title, **transfer_report(result, limits), **origin}
     report["seconds"] = {name: round(value, 3) for name, value in seconds.items()}
     report["date"] = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    write_transfer_html(folder / HTML_REPORT, report, folder / PICTURE, details)
+    heat_maps = result_heat_maps(result)
+    write_transfer_html(folder / HTML_REPORT, report, folder / PICTURE, details, heat_maps)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     report["files"] = [*files, REPORT]
     write_json(folder / REPORT, report)

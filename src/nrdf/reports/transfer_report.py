@@ -11,6 +11,7 @@ from nrdf.process.limits import Limits, strict_warnings
 from nrdf.process.path_warnings import path_warnings
 from nrdf.process.process import Process
 from nrdf.process.transfer_result import PathResult, TransferResult
+from nrdf.reports.result_report import result_content
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.file import pose_to_dict
 from nrdf.toolpath.region_samples import REASONS
@@ -31,7 +32,8 @@ waypoints; distance from the object as given, 95th percentile; cycle time."""
 def transfer_report(result: TransferResult, limits: Limits) -> dict[str, Any]:
     """Everything of a transfer that a report says, as plain values; lengths in metres."""
     regions = result.regions
-    paths = [_path(step, bool(regions[step.region].missing)) for step in result.paths]
+    turn = np.eye(3) if result.pose is None else result.pose.rotation
+    paths = [_path(step, bool(regions[step.region].missing), turn) for step in result.paths]
     metrics = [step.metrics for step in result.paths if step.metrics is not None]
     strict = strict_warnings(result)
     # A skipped region is warned about as such.
@@ -98,7 +100,7 @@ def _regions(result: TransferResult) -> dict[str, Any]:
     return regions
 
 
-def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
+def _path(step: PathResult, skipped: bool, turn: np.ndarray) -> dict[str, Any]:
     process = step.process
     content: dict[str, Any] = {
         "region": step.region,
@@ -116,6 +118,7 @@ def _path(step: PathResult, skipped: bool) -> dict[str, Any]:
         content["lines"] = len({segment.line for segment in process_segments})
         content["waypoints"] = sum(len(segment.positions) for segment in step.path.segments)
         content["metrics"] = vars(step.metrics)
+        content["result"] = result_content(step, turn[:, 1], turn[:, 0])
         content["warnings"] += path_warnings(process, step.metrics)
     elif not skipped:
         content["warnings"].append(f"no tool path: {step.reason}")
