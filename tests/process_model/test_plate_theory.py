@@ -24,7 +24,8 @@ def test_gaussian_passes_are_as_even_as_their_first_harmonic_says():
 )
 def test_the_best_stepover_is_even_and_a_wider_one_is_not(tool):
     best = best_stepover(tool)
+    enough = 0.01 if tool is GUN else 0.04
     for share in (0.5, 0.8, 1.0):
-        assert variation(tool, share * best) <= 0.03
-    assert variation(tool, 1.04 * best) > 0.025
+        assert variation(tool, share * best) <= enough
+    assert variation(tool, 1.04 * best) > 0.95 * enough
     assert strip_of(tool, np.array([0.2])) == pytest.approx(0.0)

@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix, diags
 from nrdf.errors import ProcessError
 from nrdf.process_model.moves import Moves
 
-_KEPT = 0.6  # share of the tolerance from which a deviation costs more
+_KEPT = 0.3  # share of the tolerance from which a deviation costs more
 _MORE = 30.0  # times
 _ALLOWED, _LIMIT = 0.9, 1.0  # share of the acceleration allowed; what it costs to have more
 _SHORTEST_M = 1e-4
@@ -51,7 +51,7 @@ class FeedWeights:
     """What else counts, beside the squared deviation's mean over the area. spill: film wasted for
     film wanted; change: mean squared change of slowness from move to move, in typical ones."""
 
-    spill: float = 0.02
+    spill: float = 0.05
     change: float = 0.02
 
 

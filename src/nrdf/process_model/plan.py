@@ -27,7 +27,7 @@ from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.strategy import LineOrder, Strategy
 from nrdf.toolpath.types import Segment
 
-_RUN_OFF = 0.33  # half-widths along the travel: slower ends do the rest
+_RUN_OFF = 0.5  # half-widths along the travel: slower ends do the rest
 
 
 @dataclass(frozen=True)

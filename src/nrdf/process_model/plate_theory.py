@@ -8,7 +8,9 @@ from nrdf.process_model.removal import Pad
 from nrdf.process_model.spray_profile import SprayProfile
 
 _PLACES, _CHORD = 400, 200
-_EVEN = 0.03  # standard deviation over mean, below which a stepover is even enough
+_EVEN, _PAD_EVEN = 0.01, 0.04
+"""Standard deviation over mean, below which a stepover is even enough: a pad's strip ends steeply,
+and would be even to 1 % in very many lines only."""
 _LEAST, _MOST, _TRIES = 0.15, 1.6, 117  # half-widths that a stepover is
 
 
@@ -34,10 +36,11 @@ def variation(tool: SprayProfile | Pad, stepover_m: float) -> float:
 
 
 def best_stepover(tool: SprayProfile | Pad) -> float:
-    """The widest stepover, m, below which passes on a plate are even to 3 % at any: wider ones may
-    be even too, on a plate, but bends change the stepover."""
+    """The widest stepover, m, below which passes on a plate are even to 1 % at any, to 4 % of a
+    pad: wider ones may be even too, on a plate, but bends change the stepover."""
+    enough = _EVEN if isinstance(tool, SprayProfile) else _PAD_EVEN
     tries = half_width(tool) * np.linspace(_LEAST, _MOST, _TRIES)
-    uneven = np.array([variation(tool, float(stepover)) > _EVEN for stepover in tries])
+    uneven = np.array([variation(tool, float(stepover)) > enough for stepover in tries])
     return float(tries[max(int(uneven.argmax()) - 1, 0)])
 
 

@@ -21,6 +21,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
     from nrdf_benchmark.commands.kind import kind
     from nrdf_benchmark.commands.objects import objects
     from nrdf_benchmark.commands.presence import presence
+    from nrdf_benchmark.commands.process import process
     from nrdf_benchmark.commands.scans import scans
     from nrdf_benchmark.commands.shape import shape
     from nrdf_benchmark.commands.speed import speed
@@ -37,6 +38,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
         "kind": kind,
         "presence": presence,
         "toolpaths": toolpaths,
+        "process": process,
         "speed": speed,
         "arm": arm,
     }
