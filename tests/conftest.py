@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import tempfile
 
 import pytest
 
 # One thread a process: tests run on every core at once (pytest-xdist), and start processes too.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
+# Models that whoever runs the tests has learned must not serve in them.
+os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp(prefix="nrdf-tests-")
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,17 @@ MOST_PUBLIC_NAMES = 30
 
 LAYERS = (
     *("errors", "geometry", "io", "viz", "bundled", "shapes", "field", "training", "scans"),
-    *("regions", "surface", "toolpath", "process_model", "process", "reports", "cell", "export"),
+    *(
+        "regions",
+        "learn",
+        "surface",
+        "toolpath",
+        "process_model",
+        "process",
+        "reports",
+        "cell",
+        "export",
+    ),
     *("robot.model", "robot.planning", "robot.simulation", "robot.report", "serve"),
     *("studio", "nrdf", "commands", "cli"),
 )

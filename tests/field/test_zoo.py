@@ -126,3 +126,20 @@ def test_registration_has_no_weights(stocked):
     assert (field.preset, metadata["category"]) == ("registration", "")
     with pytest.raises(ModelError, match="the model registration has no weights"):
         find_weights("registration", stocked)
+
+
+def test_the_users_own_models_stand_beside_the_packages_and_before_them(
+    tmp_path, monkeypatch, untrained
+):
+    monkeypatch.setattr(zoo, "user_data_path", lambda *_, **__: tmp_path)
+    shipped = {entry.name for entry in list_models()}
+    add_to_zoo(untrained, name="helmet", zoo=zoo.user_zoo())
+    add_to_zoo(untrained, name="car", zoo=zoo.user_zoo())
+    assert {entry.name for entry in list_models()} == shipped | {"helmet"}
+    assert find_weights("helmet") == tmp_path / "zoo" / "helmet.safetensors"
+    assert find_weights("car").parent == tmp_path / "zoo"
+    assert find_weights("plane").parent == zoo.ZOO
+    assert load_field("helmet")[1]["name"] == "helmet"
+    (tmp_path / "zoo" / "helmet.safetensors").unlink()
+    with pytest.raises(ModelError, match="missing; learn it again"):
+        find_weights("helmet")

@@ -9,7 +9,12 @@ import pytest
 
 from nrdf.errors import ModelError, ProcessError
 from nrdf.process.knowledge import Knowledge
-from nrdf.process.model_choice import choose_model, model_name_for
+from nrdf.process.model_choice import (
+    check_new_category,
+    choose_model,
+    model_name_for,
+    nearly_called,
+)
 
 
 def test_a_known_category_has_its_own_model():
@@ -62,3 +67,13 @@ def test_the_model_that_a_knowledge_names_is_taken(caplog):
         assert not caplog.records
         assert model_name_for(Knowledge(category="helmet", **content)) == "registration"
     assert "found by registration" in caplog.text
+
+
+def test_a_category_to_be_learned_must_be_a_name_and_may_be_nearly_called_like_another(caplog):
+    check_new_category("bath tub")
+    assert not caplog.records and nearly_called("chair") == ""
+    check_new_category("chairs")
+    assert "'chairs' is nearly called like 'chair'" in caplog.text
+    for wrong in ("", "a/b", "con", "registration"):
+        with pytest.raises(ProcessError, match=r"is no name|is the name"):
+            check_new_category(wrong)

@@ -40,7 +40,10 @@ def info(as_json: bool = False) -> None:
         console.print("\nthe model zoo is empty")
     for model in found["models"]:
         scores = ", ".join(f"{name} {value:.4g}" for name, value in model["scores"].items())
-        console.print(f"{model['name']}: {scores or 'no scores'}")
+        whose = ", your own" if model["own"] else ""
+        console.print(f"{model['name']}{whose}: {scores or 'no scores'}")
+        if model["own"] and model["note"]:
+            console.print(f"  {model['note']}", style="dim")
         for source, licences in model["licences"].items():
             console.print(f"  {source}: {licences}", style="dim")
     console.print("registration: trained on nothing, for any category (--model registration)")
@@ -52,7 +55,7 @@ def gather() -> dict[str, Any]:
 
     from nrdf.field.kind_network import KIND_ZOO
     from nrdf.field.yaw_network import YAW_ZOO
-    from nrdf.field.zoo import list_models
+    from nrdf.field.zoo import list_models, user_zoo
 
     devices = {"cpu": f"{torch.get_num_threads()} threads"}
     for i in range(torch.cuda.device_count()):
@@ -61,9 +64,11 @@ def gather() -> dict[str, Any]:
     entries = [(entry.name, entry) for entry in list_models()]
     for zoo in (YAW_ZOO, KIND_ZOO):
         entries += [(f"{entry.name}, {entry.preset}", entry) for entry in list_models(zoo)]
+    own = {entry.name for entry in list_models(user_zoo())}
     models = [
         {
             "name": name,
+            "own": name in own,
             "category": entry.category,
             "preset": entry.preset,
             "bytes": entry.bytes,

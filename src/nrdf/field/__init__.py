@@ -21,6 +21,7 @@ __all__ = ["PRESETS", "PRESET_GROUP", "Field", "Inverse", "build_field", "field_
 PRESETS: dict[str, str] = {
     "default": "nrdf.field.default:DefaultField",
     "paper": "nrdf.field.paper:PaperField",
+    "registration": "nrdf.field.registration:RegistrationField",
 }
 """Own presets: name to "module:class"; modules are imported when their preset is first built."""
 PRESET_GROUP = "nrdf.presets"

@@ -1,7 +1,9 @@
-"""The weights that ship with the package: by name, verified by checksum, with their provenance.
+"""The weights that ship with the package, and the user's own: by name, verified by checksum.
 
-The zoo is a folder of weight files (`nrdf.field.weights`) and an `index.json` that says of each
-one its SHA-256, preset, category, scores, training shapes by source with licences, commit and date.
+A zoo is a folder of weight files (`nrdf.field.weights`) and an `index.json` that says of each one
+its SHA-256, preset, category, scores, training shapes by source with licences, commit and date. One
+ships with the package; the other is the user's (`user_zoo`), where `nrdf model learn` puts models.
+Of two models of one name the user's is meant.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_data_path
 from pydantic import ConfigDict, TypeAdapter
 
 from nrdf.errors import ModelError, OutputError
@@ -63,11 +66,31 @@ class ZooEntry:
 _ENTRY = TypeAdapter(ZooEntry)
 
 
-def list_models(zoo: Path = ZOO) -> list[ZooEntry]:
-    """The models of the zoo by name; none if there is no index.
+def user_zoo() -> Path:
+    """The folder of the user's own models, where the system keeps such data; it may not exist."""
+    return user_data_path("nrdf", appauthor=False) / "zoo"
 
-    Raises ModelError if the index is damaged.
+
+def list_models(zoo: Path | None = None) -> list[ZooEntry]:
+    """The models of a zoo by name, of the user's and the package's unless given; none if there is
+    no index.
+
+    Raises ModelError if an index is damaged.
     """
+    return [entry for _, entry in _find_models(zoo)]
+
+
+def _find_models(zoo: Path | None) -> list[tuple[Path, ZooEntry]]:
+    """Each model with the zoo that holds it, by name; of two of one name the user's."""
+    found = {entry.name: (place, entry) for place in _zoos(zoo) for entry in _read_index(place)}
+    return [found[name] for name in sorted(found)]
+
+
+def _zoos(zoo: Path | None) -> list[Path]:
+    return [ZOO, user_zoo()] if zoo is None else [zoo]
+
+
+def _read_index(zoo: Path) -> list[ZooEntry]:
     path = zoo / INDEX
     if not path.exists():
         return []
@@ -75,22 +98,23 @@ def list_models(zoo: Path = ZOO) -> list[ZooEntry]:
         models = json.loads(read_file(path, ModelError, _LARGEST_INDEX))["models"]
         entries = [_ENTRY.validate_python({**models[n], "name": n}) for n in sorted(models)]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise ModelError(f"{path} is damaged ({error}); install nrdf again") from None
+        raise ModelError(f"{path} is damaged ({error}); {_mend(zoo)}") from None
     for entry in entries:
         if Path(entry.file).name != entry.file:
             raise ModelError(f"{path} is damaged ('{entry.file}' is no file of it)")
     return entries
 
 
-def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
+def find_weights(name: str | Path, zoo: Path | None = None) -> Path:
     """The weight file of a zoo name, of a path to one, or of a finished training run's folder.
 
-    Raises ModelError for an unknown name (listing the known ones), a run that has not finished, a
-    file that is missing, and a file of the zoo that differs from its checksum.
+    zoo: the one to look in; the user's and the package's unless given. Raises ModelError for an
+    unknown name (listing the known ones), a run that has not finished, a file that is missing, and
+    a file of the zoo that differs from its checksum.
     """
-    models = {entry.name: entry for entry in list_models(zoo)}
+    models = {entry.name: (place, entry) for place, entry in _find_models(zoo)}
     if str(name) in models:
-        return _verified(zoo, models[str(name)])
+        return _verified(*models[str(name)])
     path = Path(name)
     if path.is_dir():
         if not (path / WEIGHTS).is_file():
@@ -110,7 +134,7 @@ def find_weights(name: str | Path, zoo: Path = ZOO) -> Path:
     )
 
 
-def load_field(name: str | Path, zoo: Path = ZOO) -> tuple[Field, dict[str, Any]]:
+def load_field(name: str | Path, zoo: Path | None = None) -> tuple[Field, dict[str, Any]]:
     """The field of a zoo name or path, or the model `registration`, on the CPU in evaluation mode,
     and its metadata.
 
@@ -121,8 +145,8 @@ def load_field(name: str | Path, zoo: Path = ZOO) -> tuple[Field, dict[str, Any]
         return RegistrationField(), dict(METADATA)
     path = find_weights(name, zoo)
     loaded, metadata = load_weights(path)
-    for entry in list_models(zoo):
-        if path == zoo / entry.file:
+    for place, entry in _find_models(zoo):
+        if path == place / entry.file:
             metadata = {**metadata, "scores": {**metadata.get("scores", {}), **entry.scores}}
     return loaded, {**metadata, "name": str(name), "file": path.name}
 
@@ -172,7 +196,7 @@ def add_to_zoo(
         date=metadata.get("date"),
         note=note,
     )
-    entries = {known.name: known for known in list_models(zoo)} | {name: entry}
+    entries = {known.name: known for known in _read_index(zoo)} | {name: entry}
     try:
         zoo.mkdir(parents=True, exist_ok=True)
         content = path.read_bytes()
@@ -196,13 +220,19 @@ def _write_index(zoo: Path, entries: Mapping[str, ZooEntry]) -> None:
 def _verified(zoo: Path, entry: ZooEntry) -> Path:
     path = zoo / entry.file
     if not path.is_file():
-        raise ModelError(f"the zoo's file {path} is missing; install nrdf again")
+        raise ModelError(f"the zoo's file {path} is missing; {_mend(zoo)}")
     if _sha256(path) != entry.sha256:
         raise ModelError(
             f"the zoo's file {path} was altered or truncated: its SHA-256 is not the one in "
-            f"{INDEX}; install nrdf again"
+            f"{INDEX}; {_mend(zoo)}"
         )
     return path
+
+
+def _mend(zoo: Path) -> str:
+    if zoo == user_zoo():
+        return f"learn it again (nrdf model learn), or delete the folder {zoo}"
+    return "install nrdf again"
 
 
 def _sha256(path: Path) -> str:

@@ -15,6 +15,7 @@ from nrdf.errors import ProcessError
 from nrdf.field.registration import REGISTRATION
 from nrdf.field.weights import read_metadata
 from nrdf.field.zoo import find_weights, list_models
+from nrdf.io.file_names import file_name_problem
 from nrdf.process.knowledge import Knowledge
 
 log = logging.getLogger(__name__)
@@ -52,15 +53,13 @@ def choose_model(
                 f"{REGISTRATION}, which serves any category"
             )
         return ModelChoice(str(model))
-    known = list_models()
-    models = {entry.name for entry in known if entry.category == category}
+    models = {entry.name for entry in list_models() if entry.category == category}
     if models:
         return ModelChoice(category if category in models else min(models))
-    others = sorted({entry.category for entry in known})
-    alike = difflib.get_close_matches(category.lower(), others, n=1, cutoff=_ALIKE)
+    alike = nearly_called(category)
     if alike and not allow_unusual:
         raise ProcessError(
-            f"no model for the category '{category}'; did you mean '{alike[0]}'? If it is another "
+            f"no model for the category '{category}'; did you mean '{alike}'? If it is another "
             f"kind of object, --model {REGISTRATION} serves any category (in a knowledge file: "
             f"model: {REGISTRATION})"
         )
@@ -69,6 +68,35 @@ def choose_model(
         f"there is no model for the category '{category}': its regions are found by registration, "
         "which serves any category",
     )
+
+
+def nearly_called(category: str) -> str:
+    """The known category that is nearly called so, "" where none is, or where it is one itself."""
+    known = sorted({entry.category for entry in list_models()})
+    if category in known:
+        return ""
+    alike = difflib.get_close_matches(category.lower(), known, n=1, cutoff=_ALIKE)
+    return alike[0] if alike else ""
+
+
+def check_new_category(category: str) -> None:
+    """Check a category that a model is to be made for.
+
+    Raises ProcessError for a name that no file can have, or that is that of a model for any
+    category; warns of one that is nearly called like a known one.
+    """
+    fault = file_name_problem(category) or (
+        ""
+        if category.isprintable() and category and category == Path(category).name
+        else "it may have no separators, because it becomes a file name"
+    )
+    if fault:
+        raise ProcessError(f"'{category}' is no name for a category: {fault}")
+    if category == REGISTRATION:
+        raise ProcessError(f"'{category}' is the name of a model for any category: give another")
+    alike = nearly_called(category)
+    if alike:
+        log.warning("the category '%s' is nearly called like '%s'", category, alike)
 
 
 def model_name_for(knowledge: Knowledge) -> str:

@@ -24,7 +24,7 @@ _KEPT = 2  # targets whose registration is kept
 # Odds that a mapped point lies on the right part: (doubt / _EVEN) ** -_STEEPNESS, the doubt being
 # its distance from the target and that much of how far it comes back to. A logistic regression on
 # the points of 74 pairs of labelled tables, benches, chairs and stools.
-_CYCLE_WEIGHT, _EVEN, _STEEPNESS = 0.39, 0.072, 1.32
+CYCLE_WEIGHT, _EVEN, _STEEPNESS = 0.39, 0.072, 1.32
 
 
 class RegistrationMapper:
@@ -99,7 +99,7 @@ class _RegisteredPair:
         moved = points + DisplacementInterpolator(self._from, points).interpolate(self._moved)
         distance = self.target.distance(moved, normals)
         returned = self._returned(moved)
-        doubt = distance + _CYCLE_WEIGHT * np.linalg.norm(returned - points, axis=1)
+        doubt = distance + CYCLE_WEIGHT * np.linalg.norm(returned - points, axis=1)
         existence = 1.0 / (1.0 + (doubt / _EVEN) ** _STEEPNESS)
         count = len(points)
         return MappedPoints(moved, normals, existence, np.zeros(count), np.zeros((count, 3)))

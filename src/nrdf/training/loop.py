@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import math
 import signal
@@ -22,6 +23,7 @@ from nrdf.field import build_field
 from nrdf.field.base import Field
 from nrdf.field.device import choose_precision
 from nrdf.field.weights import save_weights
+from nrdf.field.zoo import find_weights
 from nrdf.io.locks import write_lock
 from nrdf.training.batch import Batch, seeded
 from nrdf.training.checkpoint import (
@@ -42,6 +44,7 @@ from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import validate
+from nrdf.training.weights import averaged, start_with, to_device, update_average
 
 log = logging.getLogger(__name__)
 
@@ -58,6 +61,7 @@ def train(
     device: str = "auto",
     overwrite: bool = False,
     begin: str | Path | None = None,
+    start: str | Path | None = None,
 ) -> Path:
     """Train a field for one category and export its weights; returns the weight file's path.
 
@@ -66,6 +70,9 @@ def train(
     weights, bit by bit, that it would have reached undisturbed (on the same device, with as many
     threads and processes). So does a run that starts with the newest checkpoint of another run,
     `begin`, which must have come there by the same settings, stages and shapes.
+
+    start: a model whose weights the run starts with, as `nrdf.load_model` takes it; it must be of
+    the same preset and sizes. Fresh ones unless given.
 
     Raises ConfigError, DataError (no shapes, another category), OutputError (the folder holds
     something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
@@ -80,12 +87,12 @@ def train(
         validation = None
         if workers.first and any(entry.split == "val" for entry in entries):
             validation = load_dataset(entries, "val", config.data, workers.device)
-        identity = run_identity(config, category, dataset.names)
+        identity = run_identity(config, category, dataset.names, start)
         shared = None if begin is None else common_checkpoint(Path(begin), identity)
         if workers.first and not open_run(out, identity, overwrite):
             write_identity(out, identity, environment(workers))
         workers.wait()
-        field, scores = run_stages(config, dataset, out, workers, validation, shared)
+        field, scores = run_stages(config, dataset, out, workers, validation, shared, start)
         path = out / "weights.safetensors"
         if workers.first:
             save_weights(
@@ -97,6 +104,7 @@ def train(
                     "shapes": provenance(entries),
                     "scores": scores,
                     "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+                    **({} if start is None else {"start": identity["start"]}),
                     **environment(workers),
                 },
             )
@@ -105,9 +113,18 @@ def train(
     return path
 
 
-def run_identity(config: TrainConfig, category: str, shapes: Sequence[str]) -> dict[str, Any]:
-    """What makes a run the same run; `shapes` are the names of the training shapes, in order."""
-    return {"config": config.model_dump(mode="json"), "category": category, "shapes": list(shapes)}
+def run_identity(
+    config: TrainConfig, category: str, shapes: Sequence[str], start: str | Path | None = None
+) -> dict[str, Any]:
+    """What makes a run the same run; `shapes` are the names of the training shapes, in order, and
+    `start` the model that it starts with."""
+    content = config.model_dump(mode="json")
+    identity = {"config": content, "category": category, "shapes": list(shapes)}
+    if start is not None:
+        file = find_weights(start)
+        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
+        identity["start"] = {"file": file.name, "sha256": checksum}
+    return identity
 
 
 def run_stages(
@@ -117,11 +134,15 @@ def run_stages(
     workers: Workers,
     validation: ShapeDataset | None,
     begin: Path | None = None,
+    start: str | Path | None = None,
 ) -> tuple[Field, dict[str, float]]:
     """All stages from wherever the run stands, or from the checkpoint `begin` where it has none;
-    the field to export (the average, if one is kept) and its scores on the validation shapes."""
+    the field to export (the average, if one is kept) and its scores on the validation shapes. A new
+    run begins with the weights of the model `start`."""
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
+    if start is not None:
+        start_with(field, start)
     check_parts(config, field)
     lengths = [
         stage_steps(stage, dataset.with_pools(stage.pools), workers.world)
@@ -133,7 +154,7 @@ def run_stages(
     position = Position() if checkpoint is None else read_position(checkpoint)
     average = None if checkpoint is None else load_field_state(checkpoint, field)
     if config.ema is not None:
-        average = _to(average or field.state_dict(), workers.device)
+        average = to_device(average or field.state_dict(), workers.device)
     if checkpoint is not None:
         log.info("going on from step %d of %d", position.total, sum(lengths))
 
@@ -255,7 +276,9 @@ def learning_rate(stage: Stage, step: int, length: int) -> float:
 
 
 def check_parts(config: TrainConfig, field: Field) -> None:
-    """ConfigError for a stage that trains a part which the field does not have."""
+    """ConfigError for a field without weights, or a stage that trains a part which it lacks."""
+    if not any(True for _ in field.parameters()):
+        raise ConfigError(f"the preset '{config.preset}' has no weights: nothing to train")
     for stage in config.stages:
         for name in [] if stage.parts == "all" else stage.parts:
             if name not in field.parts():
@@ -279,34 +302,6 @@ def make_optimizer(
     """A fresh optimizer, as every stage starts with."""
     kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
     return kind(parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay)
-
-
-@torch.no_grad()
-def update_average(average: dict[str, Tensor], field: nn.Module, decay: float, step: int) -> None:
-    """Move the average towards the field's weights; faster at first, while it knows little."""
-    decay = min(decay, (1 + step) / (10 + step))
-    floating, towards = [], []
-    for name, value in field.state_dict().items():
-        if value.is_floating_point():
-            floating.append(average[name])
-            towards.append(value)
-        else:
-            average[name].copy_(value)
-    torch._foreach_lerp_(floating, towards, 1 - decay)
-
-
-@contextmanager
-def averaged(field: nn.Module, average: dict[str, Tensor] | None) -> Iterator[None]:
-    """The field with averaged weights, for a while."""
-    if average is None:
-        yield
-        return
-    current = _to(field.state_dict(), None)
-    field.load_state_dict(average)
-    try:
-        yield
-    finally:
-        field.load_state_dict(current)
 
 
 @contextmanager
@@ -338,7 +333,3 @@ def not_finite(stage: Stage, step: int, terms: dict[str, Tensor]) -> str:
         f"step {step} (stage '{stage.name}') had no finite gradient and changed nothing; "
         f"not finite: {', '.join(blamed) or 'none of the losses, only a derivative'}"
     )
-
-
-def _to(state: dict[str, Tensor], device: torch.device | None) -> dict[str, Tensor]:
-    return {name: value.detach().to(device, copy=True) for name, value in state.items()}

@@ -10,16 +10,17 @@ from typing import Any
 
 
 def model() -> dict[str, Callable[..., Any]]:
-    """Make training shapes, train a model, add it to the model zoo."""
+    """Learn your own kind of object; make training shapes, train a model."""
     from nrdf.commands.model.add import add
     from nrdf.commands.model.boxes import boxes
     from nrdf.commands.model.correspond import correspond
     from nrdf.commands.model.kind import kind
+    from nrdf.commands.model.learn import learn
     from nrdf.commands.model.prepare import prepare
     from nrdf.commands.model.scan import scan
     from nrdf.commands.model.synth import synth
     from nrdf.commands.model.train import train
     from nrdf.commands.model.yaw import yaw
 
-    every = (synth, boxes, prepare, correspond, scan, train, yaw, kind, add)
+    every = (learn, synth, boxes, prepare, correspond, scan, train, yaw, kind, add)
     return {verb.__name__: verb for verb in every}

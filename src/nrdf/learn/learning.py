@@ -1,0 +1,268 @@
+"""From a folder of objects of one kind to a model of it: read, align, train, judge.
+
+Everything is kept in one folder: killed at any moment, the same call goes on where it was.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nrdf.errors import DataError
+from nrdf.field.registration import REGISTRATION, RegistrationField
+from nrdf.field.weights import load_tensors, load_weights, save_weights
+from nrdf.field.zoo import list_models, load_field
+from nrdf.learn.alignment import AlignedObjects, align_objects
+from nrdf.learn.judge import Errors, measure
+from nrdf.learn.objects import FEWEST, MOST, find_files, read_objects, too_few
+from nrdf.learn.selection import find_duplicates, hold_out
+from nrdf.regions.model import Model, load_model
+from nrdf.shapes.correspond import correspond_folders
+from nrdf.shapes.dataset import (
+    IndexRow,
+    Shape,
+    make_data_folder,
+    read_stamp,
+    write_index,
+    write_shape,
+)
+from nrdf.training.config import TrainConfig, load_config
+from nrdf.training.dataset import load_dataset
+from nrdf.training.loop import train
+from nrdf.training.provenance import list_shapes
+from nrdf.training.validation import validate
+
+log = logging.getLogger(__name__)
+
+FIELD, REFINED = "field", "refined field"
+"""Names of the candidates, beside registration."""
+GENERAL = "general"
+TEMPLATES = 12
+_MARGIN = 1.05  # of registration's doubt, up to which a field's is as good
+STEPS = ("reading", "aligning", "registering", "training", "judging")
+"""What `learn` does, in this order."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What came of it.
+
+    weights: the file of the better model; winner: `FIELD`, `REFINED` or registration; why: a
+    sentence; errors: of all on the held-out objects; notes: what was left out, and what to know;
+    used: names that were learned from; start: the model that training began with.
+    """
+
+    weights: Path
+    winner: str
+    why: str
+    errors: Errors
+    notes: tuple[str, ...]
+    used: tuple[str, ...]
+    start: str
+    held_out: tuple[Shape, ...]
+    examples: tuple[Shape, ...]
+    models: dict[str, Model]
+
+    @property
+    def shown(self) -> tuple[str, str]:
+        """The two models to compare: the winner, or the better field, and registration."""
+        field = self.winner if self.winner != REGISTRATION else best_field(self.errors)
+        return field, REGISTRATION
+
+    def describe(self) -> dict[str, Any]:
+        """What a report says."""
+        return {
+            "winner": self.winner,
+            "why": self.why,
+            "start": self.start,
+            "learned_from": list(self.used),
+            "notes": list(self.notes),
+            "errors": self.errors.describe(),
+        }
+
+
+def learn(
+    folder: Path,
+    category: str,
+    out: Path,
+    up: str = "y",
+    forward: str | None = None,
+    config: TrainConfig | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Learned:
+    """Learn a kind of object from the files in `folder`.
+
+    out: folder of all that is made. up: axis that points up in the files; forward: name of a file
+    in which +X is forward, the heading that most files have unless given. `progress` is told (step,
+    done, all). Raises DataError for what cannot be learned from, saying why; OutputError if `out`
+    cannot be written.
+    """
+    tell = progress or (lambda *_: None)
+
+    def telling(step: str) -> Callable[[int, int], None]:
+        return lambda done, total: tell(step, done, total)
+
+    files = find_files(folder)
+    read = read_objects(files, folder, category, up, out / "read", workers, telling("reading"))
+    shapes = {shape.name: shape for shape in read.shapes}
+    notes = [f"not used: {name}: {why}" for name, why in sorted(read.refused.items())]
+    if read.left:
+        notes.append(f"{read.left} of {len(files)} files are not used: {MOST} are enough")
+    if forward is not None and forward not in shapes:
+        raise DataError(
+            f"--forward names '{forward}', which is none of the files that can be used: "
+            f"{', '.join(list(shapes)[:8])}{' ...' * (len(shapes) > 8)}"
+        )
+    aligned = align_objects(read.shapes, forward, telling("aligning"))
+    notes += _notes_of(aligned, read.scans)
+    own = [one.shape for one in aligned.objects]
+    twins = find_duplicates(own)
+    for later, earlier in twins.items():
+        notes.append(f"not used: {later} is nearly the same as {earlier}")
+    distinct = [shape for shape in own if shape.name not in twins]
+    if len(distinct) < FEWEST:
+        raise DataError(too_few(len(distinct), "different from each other") + "\n" * bool(notes)
+                        + "\n".join(notes))  # fmt: skip
+    held = hold_out([shape.name for shape in distinct])
+    held_out = tuple(shape for shape in distinct if shape.name in held)
+    examples = tuple(shape for shape in distinct if shape.name not in held)
+
+    data = _write_data(out / "data", examples, folder.resolve().name, forward)
+    correspond_folders(
+        [data], min(TEMPLATES, len(examples)), workers, progress=telling("registering")
+    )
+    settings = config or load_config("learn")
+    start = find_start(data, settings)
+    tell("training", 0, 1)
+    run = train(settings, [data], out / "run", category=category, device="cpu", start=start)
+    tell("training", 1, 1)
+
+    field, metadata = load_weights(run)
+    models = {
+        FIELD: Model(field, metadata),
+        REFINED: Model(field, {**metadata, "refine": True}),
+        REGISTRATION: load_model(REGISTRATION),
+    }
+    errors = measure(models, held_out, examples, telling("judging"))
+    winner, why = choose(errors)
+    weights = out / "model.safetensors"
+    scores = {
+        f"held-out {what} {name}": float(values[:, n].mean())
+        for n, name in enumerate(errors.models)
+        for what, values in (("exact", errors.exact), ("doubt", errors.doubt))
+    }
+    facts: dict[str, Any] = {**metadata, "scores": scores, "start": start}
+    if winner == REGISTRATION:
+        plain = RegistrationField()
+        save_weights(weights, plain, {k: v for k, v in facts.items() if k != "train"})
+    else:
+        save_weights(weights, field, {**facts, "refine": winner == REFINED})
+    load_tensors(weights)
+    return Learned(
+        weights, winner, why, errors, tuple(notes), tuple(s.name for s in examples), start,
+        held_out, examples, models,
+    )  # fmt: skip
+
+
+def find_start(data: Path, config: TrainConfig) -> str:
+    """The model that training begins with: `general` if there is one, or else the field of the zoo
+    that is least far off on the training shapes' registered correspondences."""
+    known = [entry.name for entry in list_models() if entry.preset == config.preset]
+    if GENERAL in known:
+        return GENERAL
+    settings = config.data.model_copy(update={"pools": {}})
+    shapes = load_dataset(list_shapes([data]), "train", settings, "cpu")
+    errors = {}
+    for name in known:
+        field = load_field(name)[0]
+        errors[name] = validate(field, shapes).get("val/error", float("inf"))
+    return min(errors, key=lambda name: errors[name])
+
+
+def choose(errors: Errors) -> tuple[str, str]:
+    """The name of the best model, and why, in a sentence.
+
+    The field, refined or not, that is less far off on deformed copies is the candidate. It is taken
+    if it is less far off than registration there, and not in more doubt between different objects.
+    """
+    exact = dict(zip(errors.models, errors.exact.mean(axis=0), strict=True))
+    doubt = dict(zip(errors.models, errors.doubt.mean(axis=0), strict=True))
+    best = best_field(errors)
+    gain = 1 - exact[best] / exact[REGISTRATION]
+    if gain <= 0:
+        return REGISTRATION, (
+            f"on deformed copies of held-out objects the field is {-gain:.0%} farther off than "
+            "registration"
+        )
+    if doubt[best] > _MARGIN * doubt[REGISTRATION]:
+        more = doubt[best] / doubt[REGISTRATION] - 1
+        return REGISTRATION, (
+            f"the {best} is {gain:.0%} less far off on deformed copies of held-out objects, but "
+            f"between different ones {more:.0%} more in doubt than registration"
+        )
+    return best, (
+        f"the {best} is {gain:.0%} less far off than registration on deformed copies of held-out "
+        "objects, and between different ones in no more doubt"
+    )
+
+
+def best_field(errors: Errors) -> str:
+    """The field, refined or not, that is less far off on deformed copies."""
+    exact = dict(zip(errors.models, errors.exact.mean(axis=0), strict=True))
+    return min((FIELD, REFINED), key=lambda name: exact[name])
+
+
+def _write_data(data: Path, shapes: Sequence[Shape], source: str, forward: str | None) -> Path:
+    """The data folder of the training shapes; what is there and the same is kept."""
+    make_data_folder(data)
+    names = {shape.name for shape in shapes}
+    for old in data.glob("*.npz"):
+        if old.stem not in names:
+            old.unlink()
+    for shape in shapes:
+        path = data / f"{shape.name}.npz"
+        digest = int(np.abs(shape.surface_points).sum() * 1e6)
+        stamp = f"learn/1 {shape.category} {forward} {digest}"
+        if (read_stamp(path) or "").partition("+")[0] != stamp:
+            write_shape(path, replace(shape, source=source), stamp)
+    write_index(data, [IndexRow(s.name, source, "train", "the user's own") for s in shapes])
+    return data
+
+
+def _notes_of(aligned: AlignedObjects, scans: Sequence[str]) -> list[str]:
+    notes = [
+        f"not used: {one.shape.name} is unlike the others (cost {one.cost:.2f}): another kind of "
+        "object, or it does not stand upright"
+        for one in aligned.odd
+    ]
+    if len(aligned.odd) >= len(aligned.objects):
+        raise DataError(
+            f"{len(aligned.odd)} of {len(aligned.odd) + len(aligned.objects)} objects are unlike "
+            f"{aligned.prototype}: these are several kinds of objects, or --up is wrong; put each "
+            "kind into a folder of its own, all with the same axis up"
+        )
+    turned = [one for one in aligned.objects if abs(one.yaw) > np.radians(20)]
+    mirrored = [one.shape.name for one in aligned.objects if one.mirrored]
+    if not aligned.as_given:
+        notes.append(
+            f"the files have different headings: all are turned to {aligned.prototype}, and which "
+            "of its sides is the front cannot be told; look at objects.png, where +X is forward, "
+            "and name a file that has +X forward by --forward if it is wrong"
+        )
+    elif turned:
+        notes.append(
+            f"turned to the heading of the others: {', '.join(o.shape.name for o in turned)}"
+        )
+    if mirrored:
+        notes.append(f"used as their mirror images: {', '.join(mirrored)}")
+    if scans:
+        notes.append(f"{len(scans)} of the objects are scans: what they do not show is not learned")
+    return notes

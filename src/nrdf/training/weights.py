@@ -1,0 +1,58 @@
+"""A field's weights in training: what a run starts with, and the moving average that it exports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+
+from nrdf.errors import ConfigError
+from nrdf.field.base import Field
+from nrdf.field.zoo import load_field
+
+
+def start_with(field: Field, model: str | Path) -> None:
+    """Give a field the weights of a model. Raises ConfigError where it is of other sizes."""
+    given = load_field(model)[0]
+    if (given.preset, given.config) != (field.preset, field.config):
+        raise ConfigError(
+            f"the run cannot start with {model}: it is of preset '{given.preset}', or of other "
+            f"sizes than the configuration's '{field.preset}'"
+        )
+    field.load_state_dict(given.state_dict())
+
+
+@torch.no_grad()
+def update_average(average: dict[str, Tensor], field: nn.Module, decay: float, step: int) -> None:
+    """Move the average towards the field's weights; faster at first, while it knows little."""
+    decay = min(decay, (1 + step) / (10 + step))
+    floating, towards = [], []
+    for name, value in field.state_dict().items():
+        if value.is_floating_point():
+            floating.append(average[name])
+            towards.append(value)
+        else:
+            average[name].copy_(value)
+    torch._foreach_lerp_(floating, towards, 1 - decay)
+
+
+@contextmanager
+def averaged(field: nn.Module, average: dict[str, Tensor] | None) -> Iterator[None]:
+    """The field with averaged weights, for a while."""
+    if average is None:
+        yield
+        return
+    current = to_device(field.state_dict(), None)
+    field.load_state_dict(average)
+    try:
+        yield
+    finally:
+        field.load_state_dict(current)
+
+
+def to_device(state: dict[str, Tensor], device: torch.device | None) -> dict[str, Tensor]:
+    """A copy of weights by name, on a device where one is given."""
+    return {name: value.detach().to(device, copy=True) for name, value in state.items()}
