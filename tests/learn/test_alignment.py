@@ -7,7 +7,14 @@ import pytest
 import trimesh
 
 from builders.desk_lamps import write_lamps
-from nrdf.learn.alignment import align_objects, find_prototype
+from nrdf.geometry.similarity import up_axis, upright
+from nrdf.learn.alignment import (
+    AlignedObject,
+    AlignedObjects,
+    align_objects,
+    better_axis,
+    find_prototype,
+)
 from nrdf.learn.objects import find_files, read_objects, turned
 
 
@@ -48,3 +55,12 @@ def test_the_prototype_is_like_most_whatever_the_headings(shapes):
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     spun = [turned(shape, turn) if n % 2 else shape for n, shape in enumerate(shapes)]
     assert shapes[find_prototype(shapes)].name == spun[find_prototype(spun)].name != "ball.ply"
+
+
+def test_the_axis_about_which_objects_fit_better_is_found(shapes):
+    lamps = [shape for shape in shapes if shape.name != "ball.ply"][:3]
+    lying = [turned(shape, upright(up_axis("z")).T) for shape in lamps]
+    badly = [AlignedObject(shape, 0.0, False, 1.3) for shape in lying]
+    assert better_axis(lying, AlignedObjects(badly, [], "lamp0.ply", True)) == "z"
+    well = [AlignedObject(shape, 0.0, False, 0.5) for shape in lamps]
+    assert better_axis(lamps, AlignedObjects(well, [], "lamp0.ply", True)) == ""

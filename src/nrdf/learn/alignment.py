@@ -14,7 +14,7 @@ import numpy as np
 
 from nrdf.field.registration import REGISTRATION
 from nrdf.geometry.canonical import MIRROR, rotation_about_up
-from nrdf.geometry.similarity import up_axis
+from nrdf.geometry.similarity import up_axis, upright
 from nrdf.learn.objects import cloud_of, turned
 from nrdf.regions.model import load_model
 from nrdf.scans.align import align_scan
@@ -30,6 +30,9 @@ _MOST = 0.6  # share of the files that makes their heading the one to keep
 _MIRRORED = 0.15  # of cost that a mirror image must be better by
 _ODD = 1.55  # cost from which an object is unlike the others (`RegistrationPoseScorer`)
 _PROTOTYPES = 3
+_POOR = 1.05  # usual cost from which other axes are tried
+_MUCH_BETTER = 0.15
+_TRIED = 8  # objects
 _SYMMETRIC = 0.5  # agreement from which a mirror plane is believed
 _CELLS = 12  # of radii and of heights
 
@@ -101,6 +104,25 @@ def align_objects(
     odd = [one for one in made if one.cost > _ODD]
     kept = [one for one in made if one.cost <= _ODD]
     return AlignedObjects(kept, odd, shapes[first].name, as_given)
+
+
+def better_axis(shapes: Sequence[Shape], aligned: AlignedObjects) -> str:
+    """The axis ("x" or "z") about which shapes fit each other much better than about +Y, about
+    which they were aligned; "" where there is none. An axis and its opposite are not told apart.
+    """
+    usual = float(np.median([one.cost for one in aligned.objects if one.cost > 0.3]))
+    if usual < _POOR:
+        return ""
+    some = list(shapes)[:: max(1, len(shapes) // _TRIED)][:_TRIED]
+    costs = {"y": usual}
+    for axis in ("x", "z"):
+        seen = [turned(shape, upright(up_axis(axis))) for shape in some]
+        first = find_prototype(seen)
+        known = [turned(seen[first], rotation_about_up(_straightening(seen[first])))]
+        found = [_align(shape, known)[1] for n, shape in enumerate(seen) if n != first]
+        costs[axis] = float(np.median(found))
+    best = min(costs, key=lambda axis: costs[axis])
+    return best if best != "y" and costs[best] < usual - _MUCH_BETTER else ""
 
 
 def _align(shape: Shape, known: Sequence[Shape]) -> tuple[np.ndarray, float]:

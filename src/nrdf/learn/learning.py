@@ -17,7 +17,8 @@ from nrdf.errors import DataError
 from nrdf.field.registration import REGISTRATION, RegistrationField
 from nrdf.field.weights import load_tensors, load_weights, save_weights
 from nrdf.field.zoo import list_models, load_field
-from nrdf.learn.alignment import AlignedObjects, align_objects
+from nrdf.geometry.similarity import up_axis, upright
+from nrdf.learn.alignment import AlignedObjects, align_objects, better_axis
 from nrdf.learn.judge import Errors, measure
 from nrdf.learn.objects import FEWEST, MOST, find_files, read_objects, too_few
 from nrdf.learn.selection import find_duplicates, hold_out
@@ -123,10 +124,22 @@ def learn(
         )
     aligned = align_objects(read.shapes, forward, telling("aligning"))
     notes += _notes_of(aligned, read.scans)
+    axis = better_axis(read.shapes, aligned)
+    if axis:
+        # Named as in the files: the axis of the frame that they were turned into by `up`.
+        along = np.abs(upright(up_axis(up)) @ up_axis(axis))
+        letter = "xyz"[int(along.argmax())]
+        notes.append(
+            f"with {up} up the objects fit each other badly, and much better with {letter}: give "
+            f"--up {letter} or --up -{letter} if they stand so"
+        )
+    for note in notes:
+        log.warning("%s", note)
     own = [one.shape for one in aligned.objects]
     twins = find_duplicates(own)
     for later, earlier in twins.items():
         notes.append(f"not used: {later} is nearly the same as {earlier}")
+        log.warning("%s", notes[-1])
     distinct = [shape for shape in own if shape.name not in twins]
     if len(distinct) < FEWEST:
         raise DataError(too_few(len(distinct), "different from each other") + "\n" * bool(notes)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional
 
-from nrdf.commands.console import command_line, console, errors, progress_bar, show, table
+from nrdf.commands.console import command_line, console, progress_bar, show, table
 from nrdf.commands.options import Axis, Folder, Metavar
 from nrdf.io.bounds import Count
 
@@ -81,8 +81,6 @@ def learn(
             place / "report.json",
             {"command": command_line(), "category": category, **learned.describe()},
         )
-        for note in learned.notes:
-            errors.print(note, style="yellow")
         _show(learned)
         minutes = (time.monotonic() - started) / 60
         console.print(f"{minutes:.1f} min; pictures and report in {place}")
