@@ -110,7 +110,8 @@ def better_axis(shapes: Sequence[Shape], aligned: AlignedObjects) -> str:
     """The axis ("x" or "z") about which shapes fit each other much better than about +Y, about
     which they were aligned; "" where there is none. An axis and its opposite are not told apart.
     """
-    usual = float(np.median([one.cost for one in aligned.objects if one.cost > 0.3]))
+    others = [one.cost for one in aligned.objects if one.shape.name != aligned.prototype]
+    usual = float(np.median(others)) if others else 0.0
     if usual < _POOR:
         return ""
     some = list(shapes)[:: max(1, len(shapes) // _TRIED)][:_TRIED]

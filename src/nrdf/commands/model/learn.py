@@ -30,7 +30,7 @@ def learn(
     out: Folder | None = None,
     steps: Count | None = None,
     workers: Count | None = None,
-    install: bool = True,
+    no_install: bool = False,
     overwrite: bool = False,
 ) -> None:
     """Learn your own kind of object from 3 to 60 meshes or scans of it.
@@ -51,7 +51,7 @@ def learn(
         out: Folder of all that is made; runs/CATEGORY-learned unless given.
         steps: Steps of training, 0.2 s each; 1200 unless given.
         workers: Processes; all cores unless given.
-        install: Put the model into your zoo.
+        no_install: Leave your zoo as it is.
         overwrite: Begin anew.
     """
     from nrdf.field.zoo import add_to_zoo, user_zoo
@@ -84,7 +84,7 @@ def learn(
         _show(learned)
         minutes = (time.monotonic() - started) / 60
         console.print(f"{minutes:.1f} min; pictures and report in {place}")
-        if not install:
+        if no_install:
             console.print(f"not installed; use it with --model {learned.weights}")
             return
         with write_lock(user_zoo(), wait=True):
