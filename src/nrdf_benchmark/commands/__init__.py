@@ -19,6 +19,7 @@ def evaluations() -> dict[str, Callable[..., Any]]:
     from nrdf_benchmark.commands.bsrc import bsrc
     from nrdf_benchmark.commands.families import families
     from nrdf_benchmark.commands.kind import kind
+    from nrdf_benchmark.commands.line import line
     from nrdf_benchmark.commands.objects import objects
     from nrdf_benchmark.commands.presence import presence
     from nrdf_benchmark.commands.process import process
@@ -40,5 +41,6 @@ def evaluations() -> dict[str, Callable[..., Any]]:
         "toolpaths": toolpaths,
         "process": process,
         "speed": speed,
+        "line": line,
         "arm": arm,
     }

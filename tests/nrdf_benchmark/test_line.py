@@ -1,0 +1,33 @@
+"""What the benchmark of the line counts."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from nrdf_benchmark.line import LineSpeed, check_outbox
+
+
+def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
+    inbox, out = tmp_path / "inbox", tmp_path / "out"
+    inbox.mkdir()
+    for name in ("a", "b", "c"):
+        (inbox / name).write_text("x")
+    for outcome, folder, said in (
+        ("done", "a", {"source": "/in/a", "outcome": "done"}),
+        ("done", "a-2", {"source": "/in/a", "outcome": "done"}),
+        ("look-at", "b", {"source": "/in/b", "outcome": "done"}),
+        ("refused", "x", None),
+    ):
+        (out / outcome / folder).mkdir(parents=True)
+        if said:
+            (out / outcome / folder / "object.json").write_text(json.dumps(said))
+    assert check_outbox(inbox, out) == {"objects": 3, "lost": 1, "twice": 1, "halves": 2}
+
+
+def test_speed_and_growth():
+    resident = (*[500.0] * 10, *[1000.0] * 80, *[1050.0] * 10)
+    speed = LineSpeed(2, {"done": 100}, 120.0, (3.0,) * 100, resident)
+    assert speed.per_minute == 50.0 and speed.per_core_minute == 20.0
+    assert speed.memory_growth == pytest.approx(0.05)
