@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
@@ -40,7 +41,8 @@ def main(arguments: list[str]) -> int:
         _say(answers, {"failed": str(error)})
         return 2
     _say(answers, READY)
-    serve(sys.stdin, answers, lambda row, place: asdict(work.judge(row, place)))
+    with suppress(BrokenPipeError):  # the line has gone; so does this
+        serve(sys.stdin, answers, lambda row, place: asdict(work.judge(row, place)))
     return 0
 
 
