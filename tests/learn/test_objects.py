@@ -75,6 +75,7 @@ def test_nothing_but_broken_files_is_an_error_with_reasons(tmp_path):
     for n in range(3):
         (tmp_path / f"{n}.obj").write_text("f 1 2 3")
     with pytest.raises(DataError, match=r"0 objects are left of 3 files .*0\.obj: "):
-        read_objects(find_files(tmp_path), tmp_path, "lamp", "y", tmp_path / "out")
+        read_objects(find_files(tmp_path), tmp_path, "lamp", "y", tmp_path / "out" / "read")
+    assert not (tmp_path / "out").exists()
     with pytest.raises(CloudError):
         read_object(tmp_path / "0.obj", "0", "lamp", "y")

@@ -6,6 +6,7 @@ import hashlib
 import logging
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -106,6 +107,9 @@ def read_objects(
         if progress is not None:
             progress(done, len(todo))
     if len(named) < FEWEST:
+        for empty in (out, out.parent):  # nothing is left where nothing was made
+            with suppress(OSError):
+                empty.rmdir()
         why = "; ".join(f"{name}: {reason}" for name, reason in list(refused.items())[:3])
         where = f"left of {len(chosen)} files in {folder}" + f" ({why})" * bool(why)
         raise DataError(too_few(len(named), where))
