@@ -38,7 +38,7 @@ def learn(
     Brings them into one frame, trains a field on most of them, and judges it on those kept back,
     beside registration, which needs no training. The better of the two goes into your own model
     zoo under the category's name: knowledge of that category then uses it. Killed at any moment,
-    the same command goes on. 20 meshes take about 7 minutes of one core.
+    the same command goes on. 20 meshes take about 4 minutes of one core.
 
     Example: nrdf model learn meshes/ --category helmet --up z
 
