@@ -62,3 +62,9 @@ def test_a_file_is_read_and_a_wrong_one_is_answered(tmp_path):
             read_strip(file, 0.3)
     with pytest.raises(ProcessError, match="a roundness of 0"):
         fit_profile(strip(GUN), 0.2, roundness=0.0)
+
+
+def test_a_strip_around_zero():
+    film = GUN.strip(OFFSETS, 0.3)
+    found = fit_profile(Strip(OFFSETS, film, 0.3), 0.2)
+    assert found.middle_m == pytest.approx(0.0, abs=1e-6) and found.error < 1e-4

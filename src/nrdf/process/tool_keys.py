@@ -20,7 +20,7 @@ _LENGTH = PlausibleRange(0.0, 1.0)
 
 
 class Profile(Quantities):
-    """A spray gun's profile, on a plate at its stand-off; `nrdf profile` fits one to a strip."""
+    """A spray gun's profile, on a plate at its stand-off."""
 
     shape: Literal["beta", "gaussian"] = "beta"
     """beta: ends at its half-widths; gaussian: they are its standard deviations."""

@@ -133,7 +133,10 @@ def _fit(strip: Strip, shape: Shape) -> tuple[float, float, float, float, float]
     low = [1e-4, middle - half, 0.1, 0.5]
     top = [10.0 * half + 1e-3, middle + half, 3.0, 49.0]
     found = least_squares(
-        lambda p: curve(p) - film, np.clip(start, low, top), bounds=(low, top), x_scale=start
+        lambda p: curve(p) - film,
+        np.clip(start, low, top),
+        bounds=(low, top),
+        x_scale=[half, half, 1.0, 2.0],
     )
     wide, at, height, exponent = (float(value) for value in found.x)
     fine = np.linspace(-1.0, 1.0, 4001)
