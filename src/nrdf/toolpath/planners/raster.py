@@ -11,7 +11,7 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
 from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
 from nrdf.toolpath.planners.reach import reached_from_paths
-from nrdf.toolpath.planners.rod import rod_strokes
+from nrdf.toolpath.planners.rod_strokes import rod_strokes
 from nrdf.toolpath.planners.sheet_lines import line_direction, sheet_lines
 from nrdf.toolpath.planners.sheets import is_band, is_round_rod, pieces_of, sheets_of, width
 from nrdf.toolpath.strategy import Strategy
@@ -31,18 +31,28 @@ def plan_raster(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     that direction, along it where it is narrow. Round rods get strokes along them. Raises
     ProcessError for a margin that leaves nothing, and a direction that stands on the region.
     """
+    return checked(raster_of(region, parts_of(region, strategy), strategy), strategy)
+
+
+def raster_of(
+    region: RegionMesh,
+    parts: Sequence[Part],
+    strategy: Strategy,
+    beside: Sequence[SurfacePath] = (),
+) -> list[SurfacePath]:
+    """The raster of some parts of a region, without small sheets that paths beside them reach."""
     found: list[SurfacePath] = []
-    for sheet in _sheets(region, strategy):
-        if is_needed(region, sheet, found, strategy):
-            found += _sheet_paths(region, sheet, strategy, found)
-    return checked(found, strategy)
+    for sheet in _sheets(region, parts, strategy):
+        if is_needed(region, sheet, [*beside, *found], strategy):
+            found += _sheet_paths(region, sheet, strategy, [*beside, *found])
+    return found
 
 
 def plan_cross_hatch(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """A raster, and a second one across it. Raises ProcessError as `plan_raster` does."""
     found: list[SurfacePath] = []
     across: list[SurfacePath] = []
-    for sheet in _sheets(region, strategy):
+    for sheet in _sheets(region, parts_of(region, strategy), strategy):
         if is_needed(region, sheet, found, strategy):
             found += _sheet_paths(region, sheet, strategy, found)
             along = line_direction(sheet, strategy.direction)
@@ -77,9 +87,8 @@ def _sheet_paths(
     return paths
 
 
-def _sheets(region: RegionMesh, strategy: Strategy) -> list[Part]:
-    """All sheets of a region, those of its largest part first, large ones before small ones."""
-    parts = parts_of(region, strategy)
+def _sheets(region: RegionMesh, parts: Sequence[Part], strategy: Strategy) -> list[Part]:
+    """All sheets of parts, those of the first part first, large ones before small ones."""
     sheets = [sheet for part in parts for sheet in sheets_of(region, part, strategy)]
     sheets = with_room(region, sheets, strategy.tool_radius_m)
     if strategy.edge_margin_m > 0.0:
