@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
+from nrdf.errors import ProcessError
 from nrdf.geometry.mesh import Mesh
+from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
-from nrdf.toolpath.tool_body import body_touches, touching_places
+from nrdf.toolpath.mesh_planner import plan_on_mesh
+from nrdf.toolpath.strategy import Strategy
+from nrdf.toolpath.tool_body import body_touches, region_clear_of_body, touching_places
 from nrdf.toolpath.types import Segment
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -69,3 +75,35 @@ def test_places_of_a_path_where_the_body_touches():
     assert found[:, 0].min() == pytest.approx(0.175, abs=0.016)
     assert share == pytest.approx(0.15, abs=0.08)
     assert touching_places([work], corner(), 0.03, 0.0)[1] == 0.0
+
+
+def test_planned_lines_end_a_bodys_radius_before_a_wall():
+    mesh = corner()
+    low = np.abs(mesh.vertices[mesh.faces][..., 2]).max(axis=1) < 1e-9
+    floor = (mesh.face_normals[:, 2] > 0.9) & low
+    region = RegionMesh.from_faces(mesh, floor)
+    strategy = Strategy(
+        stepover_m=0.02, spacing_m=0.005, tool_radius_m=0.03, clearance_m=0.1,
+        direction=np.array([1.0, 0.0, 0.0]),
+    )  # fmt: skip
+    furthest = {}
+    for length in (0.0, 0.1):
+        own = replace(strategy, body_radius_m=0.03, body_length_m=length)
+        segments = plan_on_mesh(region, own)
+        lines = [s.positions for s in segments if s.kind == "process"]
+        furthest[length] = np.concatenate(lines)[:, 0].max()
+        share = touching_places(segments, mesh, 0.03, 0.1)[1]
+        assert (share > 0.02) == (length == 0.0)
+    assert furthest[0.0] > 0.185
+    assert 0.16 < furthest[0.1] < 0.175  # the wall stands at 0.2
+
+
+def test_a_body_that_fits_nowhere_is_said():
+    mesh = corner(0.4, gap=0.05)  # the wall hangs over a strip of the floor
+    low = np.abs(mesh.vertices[mesh.faces][..., 2]).max(axis=1) < 1e-9
+    region = RegionMesh.from_faces(mesh, (mesh.face_normals[:, 2] > 0.9) & low)
+    strategy = Strategy(
+        stepover_m=0.02, spacing_m=0.005, tool_radius_m=0.03, body_radius_m=0.5, body_length_m=0.1
+    )
+    with pytest.raises(ProcessError, match=r"body, 500 mm in radius.*everywhere in the region"):
+        region_clear_of_body(region, strategy)

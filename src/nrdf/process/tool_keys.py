@@ -62,7 +62,8 @@ class Tool(Quantities):
     that have less, such as crevices. 0: not checked."""
     body_length_m: Annotated[Positive | None, _LENGTH] = None
     """Length of its body, a cylinder that reaches back from the tool centre point along its axis.
-    With it, places where the body would touch the object are warned of."""
+    With it, planned paths leave out places where the body would touch the object, and where it
+    still would is warned of."""
     body_radius_m: Annotated[Positive | None, _LENGTH] = None
     """Radius of that cylinder; unless given, that of the footprint."""
     tcp_m: Annotated[Vector | None, PlausibleRange(-2.0, 2.0)] = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,8 @@ from nrdf.surface.mesh_cut import bisected, divided
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 
+Free = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Whether (m,) a tool may be at points (m, 3) of a surface with outward normals (m, 3)."""
 _OFF = 1e-5  # of the object's size, from which a ray starts before the surface
 _INSIDE = 0.5  # winding number
 _HALVINGS, _PARTS = 6, 2.0  # steps to where clearance ends; edges along the tool's radius
@@ -61,24 +64,32 @@ def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: flo
     """
     if clearance_m <= 0.0:
         return region
-    own = region.mesh
-    fine = refine(own.vertices, own.faces, tool_radius_m / _PARTS, most_faces=_MOST_FACES)
-    normals = TargetMesh(fine.vertices, fine.faces).vertex_normals
 
     def free(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
         return has_clearance(region.parent, points, outward, clearance_m)
 
+    found = region_where(region, free, tool_radius_m)
+    if found is None:
+        raise ProcessError(
+            f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
+            f"{readable('clearance_m', clearance_m)} free before the surface; give less, or 0"
+        )
+    return found
+
+
+def region_where(region: RegionMesh, free: Free, tool_radius_m: float) -> RegionMesh | None:
+    """The part of a region where a tool may be, cut within triangles; None where it may nowhere."""
+    own = region.mesh
+    fine = refine(own.vertices, own.faces, tool_radius_m / _PARTS, most_faces=_MOST_FACES)
+    normals = TargetMesh(fine.vertices, fine.faces).vertex_normals
     places = _drawn_in(fine)
     inside = free(places, normals)
     if inside.all():
         return region
     if not inside.any():
-        raise ProcessError(
-            f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "
-            f"{readable('clearance_m', clearance_m)} free before the surface; give less, or 0"
-        )
+        return None
 
-    # Where clearance ends on edges between a vertex with it and one without.
+    # Where that ends on edges between a vertex at which it may be and one at which it may not.
     pairs, of_face = edges_of(fine.faces)
     change = np.flatnonzero(inside[pairs[:, 0]] != inside[pairs[:, 1]])
     ends = np.where(inside[pairs[change, :1]], pairs[change], pairs[change, ::-1])

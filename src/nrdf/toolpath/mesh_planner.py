@@ -37,6 +37,7 @@ from nrdf.toolpath.region_samples import sample_evenly
 from nrdf.toolpath.size_limits import check_passes, check_size
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
+from nrdf.toolpath.tool_body import region_clear_of_body
 from nrdf.toolpath.tool_segments import (
     add_approach_retract,
     contact_points,
@@ -62,10 +63,12 @@ def plan_on_mesh(
 
     Only run-off, offset, drag and edge contact, where the strategy has them, lead off them.
     planner: the one of `nrdf.toolpath.planners.PLANNERS` that the strategy names, unless given.
-    Raises ProcessError for a margin or clearance that leaves nothing of the region, a stepover
-    wider than it, a direction that stands on it, or more than `nrdf.toolpath.size_limits` allows.
+    Raises ProcessError for a margin, clearance or tool body that leaves nothing of the region, a
+    stepover wider than it, a direction that stands on it, or more than
+    `nrdf.toolpath.size_limits` allows.
     """
     region = accessible_region(region, strategy.clearance_m, strategy.tool_radius_m)
+    region = region_clear_of_body(region, strategy)
     check_size(region, strategy)
     strategy = with_direction(region, strategy)
     make = PLANNERS[strategy.trajectory] if planner is None else planner

@@ -56,8 +56,8 @@ class Strategy:
     edge_margin_m: waypoints keep that far inside the region's border, and the footprint may reach
     over; tool_radius_m: of the footprint. clearance_m: that much must be free before the surface,
     along its normal, where it is worked. body_radius_m, body_length_m: of the tool's body, a
-    cylinder that reaches back from the tool centre point, which tells where it would touch the
-    object; a length of 0: not known.
+    cylinder that reaches back from the tool centre point, which planned paths keep off the object;
+    a length of 0: not known.
     lead_rad: tilts the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
     the normal. heading: tool x along the travel, or along one direction. standoff_m: from the tool
     centre point to the surface along the tool's axis. offset_m: along the surface's normal,

@@ -6,9 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from nrdf.errors import ProcessError
 from nrdf.geometry.frames import tangent_frames
 from nrdf.geometry.polylines import arc_length
+from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
+from nrdf.surface.tool_clearance import region_where
+from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.types import Segment
 
 _ABOVE = 0.15  # of the radius: so far from the tip, at least, the body is looked at
@@ -50,6 +54,31 @@ def body_touches(
         far = surface.first_hits(on_axis, outward[left].reshape(-1, 3))[0]
         touched[left] = far.reshape(-1, _AROUND).min(axis=1) < radius_m - _DEEPEST_M
     return touched
+
+
+def region_clear_of_body(region: RegionMesh, strategy: Strategy) -> RegionMesh:
+    """A region without the places at which the tool's body would touch the object.
+
+    Looked at with the tool along the normal, without lead and tilt. Lines then end a body's radius
+    before a wall, and the footprint may reach on to it. Whole for a tool whose body is not known.
+    Raises ProcessError where that leaves nothing.
+    """
+    radius, length = strategy.body_radius_m, strategy.body_length_m
+    if radius <= 0.0 or length <= 0.0:
+        return region
+
+    def free(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
+        tips = points + strategy.standoff_m * outward
+        return ~body_touches(region.parent, tips, -outward, radius, length)
+
+    found = region_where(region, free, strategy.tool_radius_m)
+    if found is None:
+        raise ProcessError(
+            f"the tool's body, {1e3 * radius:g} mm in radius and {1e3 * length:g} mm long, would "
+            "touch the object everywhere in the region; give the tool that fits, or leave "
+            "body_length_m out"
+        )
+    return found
 
 
 def touching_places(
