@@ -124,7 +124,7 @@ class Process(Quantities):
     spacing_m: Annotated[Positive, _SPACING] = 0.01
     """Distance between waypoints along a line."""
     edge_margin_m: Annotated[NotNegative, _LENGTH] = 0.0
-    """Kept free inside the region's border."""
+    """Kept free inside the region's border; gaps that the footprint does not fit into are none."""
     run_off_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Lines go on that far beyond their ends, along the surface's tangent."""
     run_off_height_m: Annotated[NotNegative, _LENGTH] = 0.0

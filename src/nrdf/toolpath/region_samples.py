@@ -11,6 +11,7 @@ from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.surface.tool_clearance import accessible_region, has_clearance, needed_clearance
+from nrdf.toolpath.closed_border import ClosedBorder
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.strategy import Strategy
 
@@ -46,7 +47,7 @@ class RegionSamples:
 
     accessible: (m,) whether the tool has its clearance there. inside_margin: (m,) whether a point
     is not in the edge margin: at least that far, along the surface, from the border of what is
-    accessible.
+    accessible, or from that border closed (`nrdf.toolpath.closed_border`).
     """
 
     points: np.ndarray
@@ -68,7 +69,10 @@ class RegionSamples:
         margin = strategy.edge_margin_m
         if margin > 0.0:
             left = accessible_region(region, strategy.clearance_m, strategy.tool_radius_m)
-            inside = border_distance(left.mesh, points, normals, margin) >= margin
+            closed = ClosedBorder.of(left, strategy.tool_radius_m)
+            away = border_distance(left.mesh, points, normals, margin)
+            away = np.where(away > 0.0, np.maximum(away, closed.distance(points)), away)
+            inside = away >= margin
         return RegionSamples(points, normals, free, inside)
 
     @property

@@ -53,11 +53,11 @@ class Strategy:
     line_order: "zigzag" joins lines on the surface, back and forth; "snake" lifts between them;
     "one-way" drives all in one direction; "nearest" goes on at the nearest end.
     stepover_m: between neighbouring lines, along the surface; spacing_m: between waypoints, about;
-    edge_margin_m: waypoints keep that far inside the region's border, and the footprint may reach
-    over; tool_radius_m: of the footprint. clearance_m: that much must be free before the surface,
-    along its normal, where it is worked. body_radius_m, body_length_m: of the tool's body, a
-    cylinder that reaches back from the tool centre point, which planned paths keep off the object;
-    a length of 0: not known.
+    edge_margin_m: waypoints keep that far inside the region's border, closed by the tool's radius
+    (`nrdf.toolpath.closed_border`), and the footprint may reach over; tool_radius_m: of the
+    footprint. clearance_m: that much must be free before the surface, along its normal, where it is
+    worked. body_radius_m, body_length_m: of the tool's body, a cylinder that reaches back from the
+    tool centre point, which planned paths keep off the object; a length of 0: not known.
     lead_rad: tilts the tool's tail towards the travel; tilt_rad: to the right of it; both 0: along
     the normal. heading: tool x along the travel, or along one direction. standoff_m: from the tool
     centre point to the surface along the tool's axis. offset_m: along the surface's normal,

@@ -13,6 +13,7 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.polylines import total_length
 from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
+from nrdf.toolpath.closed_border import ClosedBorder
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.level_lines import MeshLine, cut_where, level_lines, resampled
 from nrdf.toolpath.planners.ordering import snake_order
@@ -38,16 +39,19 @@ class Part:
 
     whole: the part that a sheet was cut from, and at: (v,) which of its vertices the sheet's are.
     slits: it is several flat pieces of one plane, and lines run over the slits between them.
+    closed: the whole region's border where lines keep a margin from it; None where they keep none.
     """
 
     mesh: FineMesh
     whole: Part | None = None
     at: np.ndarray | None = None
     slits: bool = False
+    closed: ClosedBorder | None = None
 
     def sheet(self, kept: np.ndarray) -> Part:
         """The triangles that are kept (f,) bool."""
-        return Part(self.mesh.part(kept), self, np.unique(self.mesh.faces[kept]))
+        used = np.unique(self.mesh.faces[kept])
+        return Part(self.mesh.part(kept), self, used, closed=self.closed)
 
     @cached_property
     def border_distance(self) -> np.ndarray | None:
@@ -57,6 +61,18 @@ class Part:
             return distance if distance is None else distance[self.at]
         border = self.mesh.border
         return distance_from(self.mesh, border) if len(border) else None
+
+    @cached_property
+    def margin_distance(self) -> np.ndarray | None:
+        """Distance (v,) from the border that a margin is kept from, m: at least that from the
+        region's border, and more where that is ragged, or near others of the region."""
+        if self.whole is not None:
+            distance = self.whole.margin_distance
+            return distance if distance is None else distance[self.at]
+        distance = self.border_distance
+        if distance is None or self.closed is None:
+            return distance
+        return np.maximum(distance, self.closed.distance(self.mesh.vertices))
 
     @cached_property
     def centre(self) -> np.ndarray:
@@ -78,7 +94,7 @@ class Part:
 
     def inside(self, lines: Sequence[MeshLine], margin_m: float) -> list[MeshLine]:
         """Lines as far as they keep a margin from the border."""
-        distance = self.border_distance if margin_m > 0.0 else None
+        distance = self.margin_distance if margin_m > 0.0 else None
         if distance is None:
             return list(lines)
         return [
@@ -90,7 +106,16 @@ def parts_of(region: RegionMesh, strategy: Strategy) -> list[Part]:
     """The parts of a region that are worth a line, the largest first, refined for the stepover."""
     meshes = refined(region, strategy).components()
     least = SPECK * np.pi * strategy.tool_radius_m**2
-    return [Part(m) for m in meshes if float(m.areas.sum()) >= least] or [Part(meshes[0])]
+    chosen = [m for m in meshes if float(m.areas.sum()) >= least] or meshes[:1]
+    closed = closed_border(region, strategy)
+    return [Part(mesh, closed=closed) for mesh in chosen]
+
+
+def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None:
+    """What lines keep the strategy's margin from; None where it has none."""
+    if strategy.edge_margin_m <= 0.0:
+        return None
+    return ClosedBorder.of(region, strategy.tool_radius_m)
 
 
 def refined(region: RegionMesh, strategy: Strategy) -> FineMesh:
@@ -200,8 +225,8 @@ def lines_at(
     line passes through it, and the others are at whole stepovers from it.
     """
     weight, margin = part.mesh.mass, strategy.edge_margin_m
-    if margin > 0.0 and part.border_distance is not None:
-        weight = weight * (part.border_distance > margin)
+    if margin > 0.0 and part.margin_distance is not None:
+        weight = weight * (part.margin_distance > margin)
     if not weight.any():
         return []
     levels = even_levels(

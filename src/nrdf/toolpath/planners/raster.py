@@ -76,8 +76,8 @@ def _sheet_paths(
     radius = strategy.tool_radius_m
     # Stripes between lines that are farther apart than the tool is wide are meant to stay.
     left = ~reached_from_paths(sheet, [*beside, *paths], max(radius, _STRIPE * strategy.stepover_m))
-    if strategy.edge_margin_m > 0.0 and sheet.border_distance is not None:
-        left &= sheet.border_distance[sheet.mesh.faces].mean(axis=1) > strategy.edge_margin_m
+    if strategy.edge_margin_m > 0.0 and sheet.margin_distance is not None:
+        left &= sheet.margin_distance[sheet.mesh.faces].mean(axis=1) > strategy.edge_margin_m
     least = _ARM * np.pi * radius**2
     if left.all() or float(sheet.mesh.areas[left].sum()) < least:
         return paths

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.tool_clearance import has_clearance
-from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, refined
+from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, closed_border, refined
 from nrdf.toolpath.planners.raster import raster_of
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.reeb_graph import touching_faces
@@ -34,7 +34,7 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
         strokes = [path for rod in rods for path in strokes_of(region, part, rod, strategy)]
         found += strokes
         if not strokes:
-            others += [Part(mesh) for mesh in part.mesh.components()]
+            others += [Part(mesh, closed=part.closed) for mesh in part.mesh.components()]
             continue
         left = ~reached_from_paths(part, strokes, strategy.tool_radius_m)
         for piece in pieces_of(part, left):
@@ -59,7 +59,8 @@ def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
     least = SPECK * np.pi * strategy.tool_radius_m**2
     order = [k for k in np.argsort(-area, kind="stable") if area[k] > 0.0]
     chosen = [k for k in order if area[k] >= least] or order[:1]
-    return [Part(fine.part(number == k)) for k in chosen]
+    closed = closed_border(region, strategy)
+    return [Part(fine.part(number == k), closed=closed) for k in chosen]
 
 
 def _is_bore(region: RegionMesh, part: Part, strategy: Strategy) -> bool:

@@ -123,7 +123,11 @@ def strokes_of(region: RegionMesh, part: Part, rod: Rod, strategy: Strategy) -> 
         good[s] = away < _AWAY * strategy.stepover_m
     if strategy.edge_margin_m > 0.0 and len(part.mesh.border):
         nearest = cKDTree(part.mesh.vertices[part.mesh.border])
-        good &= nearest.query(places)[0] > strategy.edge_margin_m
+        finite = places[good]  # where there is no surface, places are not finite
+        away = nearest.query(finite)[0]
+        if part.closed is not None:
+            away = np.maximum(away, part.closed.distance(finite))
+        good[good] = away > strategy.edge_margin_m
     origin = rod.mesh.origin[faces]
     axes = rod.frame.at(rod.stations[there])[1]
     paths, numbers = [], []
