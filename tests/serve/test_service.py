@@ -13,7 +13,8 @@ pytest.importorskip("httpx")
 from starlette.testclient import TestClient
 
 from nrdf.serve import service as service_module
-from nrdf.serve.guard import Guard, allowed_hosts
+from nrdf.serve.guard import Guard
+from nrdf.serve.hosts import allowed_hosts
 from nrdf.serve.service import Service, create_app
 
 JSON = {"content-type": "application/json"}

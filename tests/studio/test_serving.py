@@ -27,13 +27,46 @@ def server():
 
 
 def test_pages_of_elsewhere_may_not_connect(server):
-    address = f"ws://127.0.0.1:{server.get_port()}"
+    port = server.get_port()
     version = f"viser-v{viser.__version__}"
-    with connect(address, origin="http://localhost:8470", subprotocols=[version]) as own:
-        assert own.recv(timeout=10)
-    for origin in ("http://evil.example", "http://127.0.0.1.evil.example", "null"):
+    for name in ("127.0.0.1", "localhost"):
+        address = f"{name}:{port}"
+        with connect(f"ws://{address}", origin=f"http://{address}", subprotocols=[version]) as own:
+            assert own.recv(timeout=10)
+    foreign = (
+        "http://evil.example", "http://127.0.0.1.evil.example", f"http://localhost:{port}",
+        "http://127.0.0.1:3000", "null",
+    )  # fmt: skip
+    for origin in foreign:
         with pytest.raises(InvalidStatus, match="403"):
-            connect(address, origin=origin, subprotocols=[version])
+            connect(f"ws://127.0.0.1:{port}", origin=origin, subprotocols=[version])
+        assert get(port, f"127.0.0.1:{port}", f"Origin: {origin}").startswith("HTTP/1.1 403 ")
+
+
+def test_no_other_page_shows_it_within_itself(server):
+    page = get(server.get_port(), "localhost")
+    assert page.startswith("HTTP/1.1 200 ")
+    assert "frame-ancestors 'none'" in page and "X-Frame-Options: DENY" in page
+
+
+def test_where_others_can_ask_the_same_holds():
+    made = open_server("0.0.0.0", 8475, ["studio.local"])
+    try:
+        port = made.get_port()
+        for host in ("192.0.2.7:8475", "studio.local"):
+            assert get(port, host).startswith("HTTP/1.1 200 ")
+        assert get(port, "evil.example").startswith("HTTP/1.1 403 ")
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(f"ws://127.0.0.1:{port}", origin="http://evil.example")
+    finally:
+        made.stop()
+
+
+def get(port, host, *lines):
+    """What is answered to a GET at that host, its beginning."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as asked:
+        asked.sendall("\r\n".join(["GET / HTTP/1.1", f"Host: {host}", *lines, "", ""]).encode())
+        return asked.recv(4096).decode("latin-1")
 
 
 def test_nothing_leads_to_the_outside(server):
@@ -112,9 +145,7 @@ def test_a_session_that_cannot_be_kept_is_refused(tmp_path, monkeypatch, capsys)
 )
 def test_a_name_that_was_made_to_lead_here_gets_nothing(server, host, status):
     port = server.get_port()
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as asked:
-        asked.sendall(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-        assert asked.recv(4096).startswith(f"HTTP/1.1 {status} ".encode())
+    assert get(port, host).startswith(f"HTTP/1.1 {status} ")
     if host:
         version = f"viser-v{viser.__version__}"
         header = {"subprotocols": [version], "host": host}

@@ -59,7 +59,7 @@ def serve(
     """
     from nrdf.cell.file import read_cell
     from nrdf.errors import ConfigError, DataError
-    from nrdf.serve.guard import is_loopback
+    from nrdf.serve.hosts import is_loopback
 
     described = read_cell(cell)
     if not described.knowledge:
@@ -96,7 +96,8 @@ def _serve(
         from nrdf.serve.service import Service, create_app
     except ImportError:
         raise ConfigError(_NEEDED) from None
-    from nrdf.serve.guard import Guard, allowed_hosts
+    from nrdf.serve.guard import Guard
+    from nrdf.serve.hosts import allowed_hosts
     from nrdf.serve.line import open_line
     from nrdf.serve.summary import write_summary
 

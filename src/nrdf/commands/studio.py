@@ -17,6 +17,7 @@ def studio(
     session: Folder = Path("studio"),
     host: str = "127.0.0.1",
     port: Annotated[int, Bounds(1, 65535)] = 8080,
+    allow_host: tuple[str, ...] = (),
     no_browser: bool = False,
     device: str = "cpu",
     robot: File | None = None,
@@ -35,6 +36,7 @@ def studio(
         host: Address to listen on. Whoever reaches it can use the studio, so by default only this
             computer.
         port: Port to listen on; the next free one where it is taken.
+        allow_host: Further names that this computer is asked by.
         no_browser: Do not open a browser.
         device: cpu, cuda, cuda:N or auto.
         robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
@@ -50,10 +52,11 @@ def studio(
         ) from None
     import nrdf
     from nrdf.field.zoo import list_models
+    from nrdf.serve.hosts import is_loopback
     from nrdf.studio.app import Studio
     from nrdf.studio.model.computing import ChildProcessComputing
     from nrdf.studio.model.session import Session
-    from nrdf.studio.serving import LOOPBACK, open_server
+    from nrdf.studio.serving import open_server
 
     categories = [entry.category for entry in list_models()]
     if not categories:
@@ -61,13 +64,13 @@ def studio(
     kept = Session(session)
     if kept.damage:
         errors.print(kept.damage, style="yellow")
-    server = open_server(host, port)
+    server = open_server(host, port, allow_host)
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
         kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
         origin, robot, tool_frame,
     )  # fmt: skip
-    if host not in LOOPBACK:
+    if not is_loopback(host):
         errors.print(
             f"listening on {host}: everyone who can reach this computer there can see and change "
             "this session, and store files in its folder; there is no password",

@@ -1,28 +1,23 @@
-"""What stands before the service: who may ask, and how much.
-
-A browser on this machine can reach loopback too, so pages of other sites are told by their Origin,
-and names that were rebound to this address by their Host.
-"""
+"""What stands before the service: who may ask (`nrdf.serve.hosts`), and how much."""
 
 from __future__ import annotations
 
 import asyncio
 import hmac
-import ipaddress
 import json
-from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import urlsplit
 
 from starlette.exceptions import HTTPException
+
+from nrdf.serve.hosts import is_own_page, serves
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _OPEN = ("/healthz",)
 """Paths that need no token: what a load balancer asks."""
 
@@ -66,11 +61,10 @@ class Guard:
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))
         hosts = headers.get("host", [])
-        if len(hosts) != 1 or host_of(f"//{hosts[0]}") not in self.hosts:
+        if not serves(self.hosts, hosts):
             raise _Refused(400, "this Host is not served; --allow-host adds one")
         for origin in headers.get("origin", []):
-            parts = urlsplit(origin)
-            if parts.scheme not in ("http", "https") or parts.netloc.lower() != hosts[0].lower():
+            if not is_own_page(origin, hosts[0]):
                 raise _Refused(403, "requests from pages of another origin are not taken")
         if self.token is not None and scope["path"] not in _OPEN:
             given = headers.get("authorization", [""])[0].encode("latin-1", "replace")
@@ -99,27 +93,6 @@ class Guard:
             return message
 
         return limited
-
-
-def host_of(url: str) -> str:
-    """The host of a URL or of `//host:port`, without port and brackets; "" where there is none."""
-    try:
-        return (urlsplit(url).hostname or "").rstrip(".").lower()
-    except ValueError:
-        return ""
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach a host."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
-def allowed_hosts(host: str, more: Iterable[str]) -> frozenset[str]:
-    """The Hosts that are served where one listens on `host`."""
-    return frozenset(name.lower() for name in (*LOOPBACK, host, *more))
 
 
 async def _answer(send: Send, status: int, why: str) -> None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
-import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from http import HTTPStatus
 from typing import Any
 from unittest.mock import patch
@@ -18,18 +17,24 @@ from viser.infra import ClientId
 from websockets.asyncio.server import Request, Response, ServerConnection
 
 from nrdf.errors import OutputError
+from nrdf.serve.hosts import allowed_hosts, is_own_page, serves
 from nrdf.studio.model.uploads import LARGEST_UPLOAD, shown_name, too_large
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_OWN_HOSTS = r"(127\.0\.0\.1|localhost|\[::1\])(:\d+)?"
-_OWN_PAGES = re.compile(f"http://{_OWN_HOSTS}")
+_WRONG_HOST = "the studio answers to the address that it has printed; --allow-host adds a name\n"
+_WRONG_ORIGIN = "the studio answers to its own pages alone\n"
+_CLOSED = {
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+"""So that no other page shows this one within itself, and takes clicks for it."""
 
 
-def open_server(host: str, port: int) -> viser.ViserServer:
+def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> viser.ViserServer:
     """A viser server with nothing on it; on the next free port where `port` is taken.
 
-    On loopback, only pages of loopback may connect, by loopback's own names: neither a page of the
-    internet that is open in the same browser, nor one whose name was made to lead here, gets
+    Only its own pages may connect, by loopback's names, `host` and `more_hosts`: neither a page of
+    another site that is open in the same browser, nor one whose name was made to lead here, gets
     anything. Uploads that are too large are refused before memory is taken. Raises OutputError for
     a port or host that cannot be listened on.
     """
@@ -40,7 +45,7 @@ def open_server(host: str, port: int) -> viser.ViserServer:
     serve = websockets.asyncio.server.serve
     with (
         patch.object(
-            websockets.asyncio.server, "serve", _serve_own(serve) if host in LOOPBACK else serve
+            websockets.asyncio.server, "serve", _serve_own(serve, allowed_hosts(host, more_hosts))
         ),
         contextlib.redirect_stdout(io.StringIO()),
     ):
@@ -51,20 +56,22 @@ def open_server(host: str, port: int) -> viser.ViserServer:
     return server
 
 
-def _serve_own(serve: Callable[..., Any]) -> Callable[..., Any]:
-    """websockets' `serve` for loopback's own names and pages alone."""
+def _serve_own(serve: Callable[..., Any], allowed: frozenset[str]) -> Callable[..., Any]:
+    """websockets' `serve` for these names of this machine, and for its own pages alone."""
 
     def serve_own(*args: Any, process_request: Any = None, **options: Any) -> Any:
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             hosts = request.headers.get_all("Host")
-            if len(hosts) != 1 or not re.fullmatch(_OWN_HOSTS, hosts[0]):
-                return connection.respond(
-                    HTTPStatus.FORBIDDEN, "the studio answers to the address that it has printed\n"
-                )
+            if not serves(allowed, hosts):
+                return connection.respond(HTTPStatus.FORBIDDEN, _WRONG_HOST)
+            if not all(is_own_page(o, hosts[0]) for o in request.headers.get_all("Origin")):
+                return connection.respond(HTTPStatus.FORBIDDEN, _WRONG_ORIGIN)
             found: Response | None = process_request and process_request(connection, request)
+            if found is not None:
+                found.headers.update(_CLOSED)
             return found
 
-        return serve(*args, process_request=answer, origins=[_OWN_PAGES, None], **options)
+        return serve(*args, process_request=answer, **options)
 
     return serve_own
 
