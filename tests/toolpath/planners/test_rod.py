@@ -42,12 +42,15 @@ def test_what_is_no_rod_has_a_raster(region):
     assert len(plan_rod(region, STRATEGY)) == len(plan_raster(region, STRATEGY))
 
 
-def test_a_square_leg_has_strokes_on_its_sides_and_none_on_its_edges():
+def test_a_square_leg_has_strokes_on_its_sides_and_ends_and_none_on_its_edges():
     paths = plan_rod(
         box((0.4, 0.03, 0.03)), replace(STRATEGY, stepover_m=0.03, tool_radius_m=0.025)
     )
-    assert len(paths) == 4
+    ends = [path for path in paths if np.abs(path.normals[:, 0]).min() > 0.9]
+    assert len(paths) - len(ends) == 4 and len(ends) == 2
     for path in paths:
+        if any(path is end for end in ends):
+            continue
         across = np.sort(np.abs(path.contacts[:, 1:]), axis=1)
         assert across[:, 0].max() < 0.004  # in the middle of its side
         np.testing.assert_allclose(across[:, 1], 0.015, atol=1e-6)
@@ -72,6 +75,20 @@ def test_a_margin_keeps_strokes_off_the_border():
     paths = plan_rod(tube(), replace(STRATEGY, edge_margin_m=0.05))
     x = np.concatenate([path.contacts[:, 0] for path in paths])
     assert 0.045 < x.min() < 0.07 and 0.33 < x.max() < 0.355
+
+
+def test_ends_that_are_narrower_than_the_tools_radius_are_not_worked():
+    fine = replace(STRATEGY, stepover_m=0.03, tool_radius_m=0.025)
+    paths = plan_rod(box((0.4, 0.02, 0.02)), fine)
+    assert len(paths) == 4 and min(total_length(path.contacts) for path in paths) > 0.38
+
+
+def test_strokes_look_to_all_sides_of_a_thin_rod():
+    wide = replace(STRATEGY, stepover_m=0.025, tool_radius_m=0.025)
+    looks = np.array([path.normals[len(path.normals) // 2] for path in plan_rod(tube(0.008), wide)])
+    angle = np.linspace(0.0, 2.0 * np.pi, 90)
+    around = np.stack([0.0 * angle, np.cos(angle), np.sin(angle)], axis=1)
+    assert (around @ looks.T).max(axis=1).min() > 0.6  # within the reach of a tool on one of them
 
 
 def test_a_wide_panel_that_tapers_has_the_lines_of_a_raster():

@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import trimesh
 
 from builders.regions_of_shapes import flipped, sheet, tube
 from nrdf.geometry.polylines import total_length
@@ -41,6 +42,19 @@ def test_four_legs_with_rails_between_are_rods_of_their_own():
     for path in paths:  # none turns from a leg into a rail
         way = np.ptp(path.contacts, axis=0)
         assert np.sort(way)[1] < 0.03
+
+
+def test_a_post_on_a_foot_is_two_rods_and_the_foot_is_whole():
+    foot = trimesh.creation.box((0.46, 0.024, 0.024))
+    post = trimesh.creation.box((0.05, 0.45, 0.024)).apply_translation((-0.08, 0.225, 0.0))
+    both = foot.union(post)
+    part = Part(refine(np.array(both.vertices), np.array(both.faces), 0.011))
+    rods, rest = rods_of(part, STRATEGY)
+    assert len(rods) == 2 and not rest
+    for rod, way in zip(sorted(rods, key=lambda rod: rod.around_m), np.eye(3), strict=False):
+        straight = np.abs(rod.frame.along @ way)
+        assert straight.min() > 0.95
+        assert np.ptp(rod.stations) > 0.42
 
 
 def frame() -> tuple[np.ndarray, np.ndarray]:
@@ -93,5 +107,5 @@ def test_a_tube_that_closes_to_a_ring_has_few_strokes_all_along_it():
     (part,) = parts_of(loop(), wide)
     assert is_rod(part)
     paths = plan_rod(loop(), wide)
-    assert len(paths) == 3
+    assert len(paths) == 4
     assert min(total_length(path.contacts) for path in paths) > 1.7

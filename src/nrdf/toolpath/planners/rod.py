@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.tool_clearance import has_clearance
 from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, closed_border, refined
+from nrdf.toolpath.planners.flat_sheets import is_flat
 from nrdf.toolpath.planners.raster import raster_of
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.reeb_graph import touching_faces
@@ -18,7 +19,8 @@ from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
 _BORE, _ROOM = 4.0, 0.3  # footprints, and the share of the area before which there is room
-_WIDE = 0.5  # tool radii: what is left is wider
+_WIDE, _CAP = 0.5, 0.75
+"""Tool radii: what is left is wider; and squares of them: a flat end is larger."""
 
 
 def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
@@ -77,6 +79,6 @@ def _is_bore(region: RegionMesh, part: Part, strategy: Strategy) -> bool:
 def _is_wide(part: Part, radius_m: float) -> bool:
     """Whether a part that was left is worth a line of its own."""
     area = float(part.mesh.areas.sum())
-    if area < SPECK * np.pi * radius_m**2:
+    if area < (_CAP * radius_m**2 if is_flat(part) else SPECK * np.pi * radius_m**2):
         return False
     return area >= _WIDE * radius_m * float(np.ptp(part.mesh.vertices @ part.axes[0]))

@@ -24,8 +24,9 @@ _LONG = 0.7  # of its section's length: a chain that is longer is a rod's
 _STRAIGHT = 0.76  # cosine: chains that turn less at a junction go on there
 _ALIKE = 2.5  # and whose sections' lengths differ by less than that factor
 _BEND = 0.77  # cosine: a rod that turns more within its thickness is cut there
-_SLANTED = 0.75  # thicknesses: so near an end, bands are not square to the rod
+_SLANTED = 0.75  # thicknesses: so near an end or a junction, bands are not square to the rod
 _SAMPLES = 0.25  # of a thickness, between points of an axis
+_LED_ON = 4.0  # thicknesses that a rod goes on beyond its axis, at most
 _ROUNDS = 4  # in which a triangle takes its neighbours' rod
 
 
@@ -52,16 +53,20 @@ def split_at_branches(
         return [], np.full(len(mesh.faces), -1)
     axes: list[Axis] = []
     for rod in _joined(graph, chains, cluster):
-        nodes = np.concatenate(rod)
-        thick = float(np.median(graph.around[nodes])) / np.pi
-        trim = int(min(_SLANTED * thick / graph.band_m, 0.25 * len(nodes)))
-        middle = nodes[trim : len(nodes) - trim]
+        thick = float(np.median(graph.around[np.concatenate(rod)])) / np.pi
+        middle = np.concatenate([_middle(chain, thick / graph.band_m) for chain in rod])
         for points in _cut_at_bends(_smooth(graph.centre[middle], thick), thick):
             axes.append(Axis(points, thick))
     axes = _without_shadows(axes)
     if len(axes) == 1:
         return axes, np.zeros(len(mesh.faces), int)
     return axes, _nearest_axis(mesh, axes)
+
+
+def _middle(chain: np.ndarray, thick: float) -> np.ndarray:
+    """A chain's nodes without those at its ends, where it meets others; thick: in bands."""
+    trim = int(min(_SLANTED * thick, 0.25 * len(chain)))
+    return chain[trim : len(chain) - trim]
 
 
 def _long_chains(graph: ReebGraph, least_m2: float) -> tuple[list[np.ndarray], np.ndarray]:
@@ -241,7 +246,8 @@ def _without_shadows(axes: list[Axis]) -> list[Axis]:
 def _nearest_axis(mesh: FineMesh, axes: list[Axis]) -> np.ndarray:
     """The axis (f,) that each triangle is nearest to, in thicknesses of its rod."""
     away = np.stack(
-        [cKDTree(axis.points).query(mesh.centres)[0] / axis.thickness_m for axis in axes], axis=1
+        [cKDTree(_led_on(axis, axes)).query(mesh.centres)[0] / axis.thickness_m for axis in axes],
+        axis=1,
     )
     number = away.argmin(axis=1)
     _, of_face = mesh.edges
@@ -252,3 +258,19 @@ def _nearest_axis(mesh: FineMesh, axes: list[Axis]) -> np.ndarray:
         votes = beside @ np.eye(len(axes))[number]
         number = votes.argmax(axis=1)
     return np.asarray(number)
+
+
+def _led_on(axis: Axis, axes: list[Axis]) -> np.ndarray:
+    """The points (n, 3) of an axis, led on straight up to the rods that it meets."""
+    others = [other for other in axes if other is not axis]
+    near = min(8, len(axis.points) - 1)
+    far = np.arange(1, round(_LED_ON / _SAMPLES) + 1)[:, None] * _SAMPLES * axis.thickness_m
+    pieces = [axis.points]
+    for end, inner in ((0, near), (-1, -1 - near)):
+        ahead = unit_vectors((axis.points[end] - axis.points[inner])[None])
+        beyond = axis.points[end] + far * ahead
+        free = np.ones(len(beyond), bool)
+        for other in others:
+            free &= cKDTree(other.points).query(beyond)[0] > other.thickness_m
+        pieces.append(beyond[np.logical_and.accumulate(free)])
+    return np.concatenate(pieces)

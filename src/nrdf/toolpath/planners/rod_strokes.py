@@ -50,8 +50,11 @@ _STRAIGHT = 2.0  # thicknesses: sections that differ over less don't lead stroke
 _STEP = 2.0  # spacings: a longer step lifts the tool
 _SHARES = 120  # places around a section at which its sides are told apart
 _CORNER, _NEAR = 0.7, 0.04  # cosine of a turn within twice that share of a section: a corner
-_MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.14, 0.9, 0.15
+_MOST_APART, _LEAST_APART, _LEAST_SIDE = 1.14, 0.95, 0.15
 """Stepovers: between strokes of one side, and the narrowest side that has a stroke."""
+_SINGLE = 1.5  # tool radii: so wide a side is reached from its middle
+_LOOKS, _AROUND = float(np.radians(110.0)), 4
+"""What a tool that looks one way reaches of a turn, and strokes that a round section needs."""
 _AWAY = 0.4  # stepovers from where a stroke should be: there is no surface
 _PART = 0.8  # of the usual section's length: what is shorter is cut at an end
 _REST = 0.2  # of a part's area that is in no rod
@@ -175,15 +178,18 @@ def _rod(mesh: FineMesh, points: np.ndarray, thickness_m: float, strategy: Strat
 def _stroke_shares(
     rod: Rod, usual: Sequence[Section], strategy: Strategy
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (k,) of a section at which strokes run, and the side (k,) that each is on."""
-    length = float(np.quantile([section.length_m for section in usual], 0.8))
-    if not rod.closed:
-        length = float(np.quantile([s.length_m - s.gap_m for s in usual], 0.8))
-    corners = _corners(rod, usual)
+    """Shares (k,) of a section at which strokes run, and the side (k,) that each is on.
+
+    As many on a side as its width needs, and as it turns: a tool looks one way.
+    """
+    around = [s.length_m if rod.closed else s.length_m - s.gap_m for s in usual]
+    length, typical = np.quantile(around, [0.8, 0.5])
+    normals = _mean_normals(rod, usual)
+    corners = _corners(rod, normals)
     if not rod.closed:
         corners = np.unique(np.concatenate([[0.0], corners, [1.0]]))
     elif not len(corners):
-        number = max(int(np.ceil(length / strategy.stepover_m / _MOST_APART)), 1)
+        number = max(int(np.ceil(length / strategy.stepover_m / _MOST_APART)), _AROUND)
         return np.arange(number) / number, np.zeros(number, int)
     else:
         corners = np.append(corners, corners[0] + 1.0)
@@ -192,15 +198,25 @@ def _stroke_shares(
         width = (last - first) * length / strategy.stepover_m
         if width < _LEAST_SIDE and len(corners) > 2 and length > strategy.stepover_m:
             continue
-        number = max(int(np.ceil(width / _MOST_APART)), 1)
-        apart = max(width / number, _LEAST_APART) * strategy.stepover_m / length
-        shares.append(0.5 * (first + last) + apart * (np.arange(number) - 0.5 * (number - 1)))
+        single = width * strategy.stepover_m <= _SINGLE * strategy.tool_radius_m
+        number = 1 if single else int(np.ceil(width / _MOST_APART))
+        at, angle = _turning(normals, first, last)
+        looks = int(np.ceil((angle[-1] - angle[0]) / _LOOKS)) if len(angle) else 0
+        if looks > 1 and looks >= number:
+            number = looks
+            way = (np.arange(number) + 0.5) / number
+            shares.append(np.interp(angle[0] + way * (angle[-1] - angle[0]), angle, at))
+        else:
+            apart = max(width / number, _LEAST_APART) * strategy.stepover_m / typical
+            apart = min(apart, (last - first) / number) if number > 2 else apart
+            middle = 0.5 * (first + last)
+            shares.append(middle + apart * (np.arange(number) - 0.5 * (number - 1)))
         sides.append(np.full(number, side))
     return np.concatenate(shares), np.concatenate(sides)
 
 
-def _corners(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
-    """Shares (c,) of a section at which its normals turn sharply, over most of the rod."""
+def _mean_normals(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
+    """The mean normal (_SHARES, 2) at places around a section, 0 in gaps."""
     shares = (np.arange(_SHARES) + 0.5) / _SHARES
     mean = np.zeros((_SHARES, 2))
     for section in usual:
@@ -211,7 +227,21 @@ def _corners(rod: Rod, usual: Sequence[Section]) -> np.ndarray:
         normal = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         mean += normal * (section.faces[step] >= 0)[:, None]
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300))
+
+
+def _turning(normals: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (n,) between two corners, and how far the side has turned there (n,), rad, never
+    back."""
+    place = np.arange(round((first + _NEAR) * _SHARES), round((last - _NEAR) * _SHARES))
+    place = place[normals[place % _SHARES].any(axis=1)]
+    normal = normals[place % _SHARES]
+    angle = np.unwrap(np.arctan2(normal[:, 1], normal[:, 0]))
+    return (place + 0.5) / _SHARES, np.maximum.accumulate(angle)
+
+
+def _corners(rod: Rod, mean: np.ndarray) -> np.ndarray:
+    """Shares (c,) of a section at which its mean normals turn sharply."""
     reach = max(round(_NEAR * _SHARES), 1)
     if rod.closed:
         cosine = (np.roll(mean, reach, axis=0) * np.roll(mean, 1 - reach, axis=0)).sum(axis=1)
