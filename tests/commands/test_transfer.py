@@ -69,6 +69,20 @@ def test_a_scan_in_any_pose_gets_tool_paths_where_it_stands(taught, untrained, c
     assert re.search(r"up for the object is -?0\.0\d+ -?0\.0\d+ (1\.0|0\.9)", head)
 
 
+def test_loose_triangles_are_refused_before_anything_is_done(
+    taught, untrained, capsys, monkeypatch
+):
+    monkeypatch.setattr("nrdf.io.formats.meshes.outer_skin", None)  # the first that would be
+    rng = np.random.default_rng(0)
+    corners = (rng.random((5000, 1, 3)) + rng.normal(0, 0.01, (5000, 3, 3))).reshape(-1, 3)
+    soup = trimesh.Trimesh(corners, np.arange(15_000).reshape(-1, 3), process=False)
+    soup.export(taught / "soup.stl")
+    assert transfer(taught, untrained, "--unit", "m", target=taught / "soup.stl") == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "5000 of its 5000 triangles are loose" in said and "merge its vertices" in said
+    assert not (taught / "job").exists()
+
+
 def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
     """In its unit, whatever was sampled of it; the limit is on that distance."""
     box = trimesh.creation.box(1000 * SIZE)

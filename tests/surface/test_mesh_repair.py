@@ -39,7 +39,7 @@ def test_the_covered_ends_of_parts_that_overlap_are_hidden():
 
 def test_loose_triangles_are_no_surface():
     vertices = np.random.default_rng(0).random((60_000, 3))
-    with pytest.raises(DataError, match="20000 of its 20000 triangles touch no other"):
+    with pytest.raises(DataError, match="20000 of its 20000 triangles are loose"):
         repaired_skin(vertices, np.arange(60_000).reshape(-1, 3))
 
 

@@ -10,12 +10,12 @@ from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.loose_triangles import SAME_PLACE, check_surface, count_loose
 from nrdf.geometry.mesh import (
     check_coordinate_range,
     check_mesh,
     clean_mesh,
     outer_skin,
-    triangle_areas,
     triangle_crosses,
 )
 from nrdf.geometry.winding import MeshWindingNumber
@@ -32,9 +32,7 @@ _CROSSINGS = 12  # of a ray with the surface
 _PLACES = np.array(
     [[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2], [5.6, 0.2, 0.2], [0.2, 5.6, 0.2], [0.2, 0.2, 5.6]]
 )
-_SAME_PLACE = 2e-6  # longest sides within which vertices of loose triangles are one
-_MOST_MET = 100.0  # faces that a line through a surface meets, on average
-_LOOSE, _MANY_LOOSE = 0.5, 10_000  # share and number of faces that touch no other: no surface
+_LOOSE = 0.5  # share of faces that touch no other from which vertices are sewn
 
 
 def repaired_skin(
@@ -43,7 +41,7 @@ def repaired_skin(
     """Vertices (v, 3), outward faces (f, 3) of the outer skin, and the repairs, in words.
 
     Raises DataError for what is no surface: no face with an area, nothing that is seen from
-    outside, or many triangles that hardly any other touches.
+    outside, or what `nrdf.geometry.loose_triangles.check_surface` refuses.
     """
     vertices, faces = check_mesh(vertices, faces)
     check_coordinate_range(vertices)
@@ -52,24 +50,12 @@ def repaired_skin(
     repairs: list[str] = []
     if len(faces) < given:
         repairs.append(_said(given - len(faces), "without area or given twice", "removed"))
-    loose = _loose(faces)
+    check_surface(vertices, faces)
+    loose = count_loose(faces, 1)
     if loose > _LOOSE * len(faces) and len(faces) > 1:
-        sewn = _sewn(vertices, faces)
-        vertices, faces = clean_mesh(*sewn)
-        if (left := _loose(faces)) < loose:
+        vertices, faces = clean_mesh(*_sewn(vertices, faces))
+        if (left := count_loose(faces, 1)) < loose:
             repairs.append(_said(loose - left, "that touched no other", "sewn to their neighbours"))
-        loose = left
-    if loose > _LOOSE * len(faces) and loose > _MANY_LOOSE:
-        raise DataError(
-            f"{loose} of its {len(faces)} triangles touch no other: that is no surface; "
-            "merge its vertices, or give its points as a cloud"
-        )
-    met = _met_by_lines(vertices, faces)
-    if met > _MOST_MET:
-        raise DataError(
-            f"a straight line through it meets {met:.0f} of its {len(faces)} triangles on average: "
-            "that is no surface; check its faces, or give its points as a cloud"
-        )
     before = faces
     faces = outer_skin(vertices, faces, _VIEWED, np.random.default_rng(0))[0]
     turned = int((faces != before).any(axis=1).sum())
@@ -176,23 +162,10 @@ def _leaving(
     return np.asarray(total > 0)
 
 
-def _met_by_lines(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """How many faces a line meets that meets the mesh's box, on average (Crofton's formula)."""
-    area = float(triangle_areas(vertices, faces).sum())
-    x, y, z = np.ptp(vertices, axis=0)
-    return area / max(float(x * y + y * z + z * x), 1e-300)
-
-
-def _loose(faces: np.ndarray) -> int:
-    """How many faces share no vertex with another."""
-    count = np.bincount(faces.reshape(-1))
-    return int((count[faces] == 1).all(axis=1).sum())
-
-
 def _sewn(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Vertices that are nearly in one place as one."""
     near = cKDTree(vertices).query_pairs(
-        _SAME_PLACE * float(np.ptp(vertices, axis=0).max()), output_type="ndarray"
+        SAME_PLACE * float(np.ptp(vertices, axis=0).max()), output_type="ndarray"
     )
     links = coo_matrix((np.ones(len(near), bool), tuple(near.T)), (len(vertices),) * 2)
     place = connected_components(links, directed=False)[1]

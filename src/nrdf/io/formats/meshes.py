@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import CloudError, DataError
+from nrdf.geometry.loose_triangles import check_surface
 from nrdf.geometry.mesh import Mesh, outer_skin
 from nrdf.io.files import open_file
 from nrdf.io.formats.mesh_claims import check_claimed_sizes, off_counts
@@ -75,7 +76,9 @@ def read_mesh(path: Path, samples: int) -> RawCloud:
 
 def sample_mesh(vertices: np.ndarray, faces: np.ndarray, samples: int) -> RawCloud:
     """`samples` points of the visible surface of a mesh that was checked, with outward normals;
-    the same points every time. Raises DataError if too little of it is seen."""
+    the same points every time. Raises DataError for triangles that are no surface
+    (`nrdf.geometry.loose_triangles`), and if too little of it is seen."""
+    check_surface(vertices, faces)
     skin = outer_skin(vertices, faces, samples, np.random.default_rng(0))[1]
     return RawCloud(skin.points, skin.normals, mesh=Mesh(vertices, faces))
 
