@@ -7,9 +7,10 @@ outlines are set off by depth. Lines are drawn only where nothing lies before th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Protocol
 
 import igl
@@ -28,6 +29,7 @@ _SUNK = 0.0015  # canonical depth by which a line may lie in the surface and sti
 _STEEP = 0.012  # the same beside an outline, where depth changes within a pixel
 _PATH, _EDGE, _AIR = 1.6, 0.8, 1.0  # radius of lines in fine pixels
 _DOT = 4.5  # radius of the dot where a region's first line begins
+_AT_ONCE = 1 << 16  # pixels
 _SAMPLES = 6000  # places of the surface by which a view is chosen
 _INK = np.array([0.25, 0.27, 0.31], np.float32)
 
@@ -159,7 +161,10 @@ class MeshScene:
         face, depth = _rasterised(view, layer, shape)
         image = np.ones((*shape, 3), np.float32)
         seen = np.nonzero(face >= 0)
-        image[seen] = self._shaded(view, face[seen], np.stack(seen[::-1], 1) + 0.5, axes, table)
+        for start in range(0, len(seen[0]), _AT_ONCE):
+            row, column = (one[start : start + _AT_ONCE] for one in seen)
+            at = np.stack([column, row], 1) + 0.5
+            image[row, column] = self._shaded(view, face[row, column], at, axes, table)
         image *= eye_dome(np.where(face >= 0, depth, np.float32(-1.5)), OVERSAMPLING)[..., None]
         lowest = ndimage.minimum_filter(depth, 3)
         canvas = Canvas(image, depth - np.clip(depth - lowest, _SUNK, _STEEP), axes, corner, pixels)
@@ -206,43 +211,79 @@ def _rasterised(
     to the depth of faces that look this way where two meet.
     """
     # Most triangles of a fine mesh lie beyond the window, or between the middles of two rows.
-    x, y, z = view
+    x, y, _ = view
     low = np.ceil(np.maximum(y.min(axis=0) - 0.5, 0.0))
     high = np.floor(np.minimum(y.max(axis=0) - 0.5, shape[0] - 1.0))
     drawn = np.flatnonzero((high >= low) & (x.max(axis=0) >= 0.0) & (x.min(axis=0) <= shape[1]))
-    x, y, z = (one[:, drawn] for one in (x, y, z))
     low, high = low[drawn].astype(np.int64), high[drawn].astype(np.int64)
-    twice = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
-    rows = np.where(np.abs(twice) > 1e-9, high - low + 1, 0)
-    twice = np.where(rows > 0, twice, 1.0)
-    face, row = counted(rows, low)
-    # Along a row, a triangle reaches from its longest edge upwards to one of the two others.
-    order = y.argsort(axis=0)
-    (xa, xb, xc), (ya, yb, yc) = (np.take_along_axis(one, order, axis=0) for one in (x, y))
-    height = row + 0.5
-    one = xa[face] + (height - ya[face]) * _ratio(xc - xa, yc - ya)[face]
-    below = height < yb[face]
-    slope = np.where(below, _ratio(xb - xa, yb - ya)[face], _ratio(xc - xb, yc - yb)[face])
-    other = xb[face] + (height - yb[face]) * slope
-    first = np.ceil(np.clip(np.minimum(one, other) - 0.5, 0.0, shape[1])).astype(np.int64)
-    last = np.floor(np.clip(np.maximum(one, other) - 0.5, -1.0, shape[1] - 1.0)).astype(np.int64)
-    # Depth as a function of the pixel, within what the triangle has: it may be seen edge-on.
-    depth_x = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / twice
-    depth_y = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / twice
-    start = z[0] + depth_x * (0.5 - x[0]) - depth_y * y[0]
-    start, slope = start[face] + depth_y[face] * height, depth_x[face]
-    nearest, farthest = z.max(axis=0)[face], z.min(axis=0)[face]
-    lifted = np.where(twice > 0.0, layer[drawn] + _LAYER, 0.0).astype(np.float32)[face]
-    span, column = counted(np.maximum(last - first + 1, 0), first)
-    at = np.clip(start[span] + slope[span] * column, farthest[span], nearest[span])
-    at = at.astype(np.float32) + lifted[span]
-    pixel = (row * shape[1])[span] + column
     depth = np.full(shape[0] * shape[1], -np.inf, np.float32)
-    np.maximum.at(depth, pixel, at)
     owner = np.full(shape[0] * shape[1], -1)
-    wins = at == depth[pixel]
-    owner[pixel[wins]] = drawn[face[span[wins]]]
+    for some in _parts(high - low + 1):
+        rows = _Rows.of(view[:, :, drawn[some]], low[some], high[some], shape[1])
+        count = np.maximum(rows.last - rows.first + 1, 0)
+        lifted = np.where(rows.facing, layer[drawn[some]] + _LAYER, 0.0).astype(np.float32)
+        for part in _parts(count):
+            span, column = counted(count[part], rows.first[part])
+            at = rows.start[part][span] + rows.slope[part][span] * column
+            at = np.clip(at, rows.farthest[part][span], rows.nearest[part][span])
+            face = rows.face[part][span]
+            at = at.astype(np.float32) + lifted[face]
+            pixel = (rows.row[part] * shape[1])[span] + column
+            np.maximum.at(depth, pixel, at)
+            wins = at == depth[pixel]
+            owner[pixel[wins]] = drawn[some][face[wins]]
     return owner.reshape(shape), np.maximum(depth, np.float32(-10.0)).reshape(shape)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """What triangles cover of rows of pixels (n,): the triangle `face`, the number `row`, the
+    `first` and `last` pixel. Depth is `start` + `slope` times the pixel's number, from `farthest`
+    to `nearest`. facing: of each triangle (f,), whether it looks this way."""
+
+    face: np.ndarray
+    row: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    start: np.ndarray
+    slope: np.ndarray
+    farthest: np.ndarray
+    nearest: np.ndarray
+    facing: np.ndarray
+
+    @staticmethod
+    def of(view: np.ndarray, low: np.ndarray, high: np.ndarray, width: int) -> _Rows:
+        """Of triangles (3, 3, f), from row `low` (f,) to `high`, of an image of that width."""
+        x, y, z = view
+        twice = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
+        rows = np.where(np.abs(twice) > 1e-9, high - low + 1, 0)
+        twice = np.where(rows > 0, twice, 1.0)
+        face, row = counted(rows, low)
+        # Along a row, a triangle reaches from its longest edge upwards to one of the two others.
+        order = y.argsort(axis=0)
+        (xa, xb, xc), (ya, yb, yc) = (np.take_along_axis(one, order, axis=0) for one in (x, y))
+        height = row + 0.5
+        one = xa[face] + (height - ya[face]) * _ratio(xc - xa, yc - ya)[face]
+        below = height < yb[face]
+        slope = np.where(below, _ratio(xb - xa, yb - ya)[face], _ratio(xc - xb, yc - yb)[face])
+        other = xb[face] + (height - yb[face]) * slope
+        first = np.ceil(np.clip(np.minimum(one, other) - 0.5, 0.0, width)).astype(np.int64)
+        last = np.floor(np.clip(np.maximum(one, other) - 0.5, -1.0, width - 1.0)).astype(np.int64)
+        # Depth as a function of the pixel, within what the triangle has: it may be seen edge-on.
+        depth_x = ((z[1] - z[0]) * (y[2] - y[0]) - (z[2] - z[0]) * (y[1] - y[0])) / twice
+        depth_y = ((z[2] - z[0]) * (x[1] - x[0]) - (z[1] - z[0]) * (x[2] - x[0])) / twice
+        start = (z[0] + depth_x * (0.5 - x[0]) - depth_y * y[0])[face] + depth_y[face] * height
+        reach = z.min(axis=0)[face], z.max(axis=0)[face]
+        return _Rows(face, row, first, last, start, depth_x[face], *reach, twice > 0.0)
+
+
+def _parts(count: np.ndarray) -> Iterator[slice]:
+    """Slices of what has `count` (n,) rows or pixels, about as many in each: all at once would take
+    a gigabyte, and leave the processor's cache."""
+    total = np.cumsum(count)
+    ends = np.arange(_AT_ONCE, int(total[-1]) if len(total) else 0, _AT_ONCE)
+    cuts = [0, *np.searchsorted(total, ends), len(count)]
+    return (slice(one, other) for one, other in pairwise(cuts))
 
 
 def _ratio(one: np.ndarray, other: np.ndarray) -> np.ndarray:
