@@ -100,3 +100,14 @@ def test_one_row_goes_on_where_the_last_ended():
     top = [path for path in paths if path.normals[:, 2].mean() > 0.9]
     for before, after in pairwise(top):
         assert np.linalg.norm(after.contacts[0] - before.contacts[-1]) < 0.03
+
+
+@pytest.mark.parametrize(("radius", "worked"), [(0.008, False), (0.06, True)])
+def test_the_wall_of_a_hole_gets_lines_where_a_tool_fits_in(radius, worked):
+    plank = trimesh.creation.box((0.3, 0.2, 0.04))
+    drilled = plank.difference(trimesh.creation.cylinder(radius, 0.1))
+    mesh = TargetMesh(np.asarray(drilled.vertices), np.asarray(drilled.faces), ())
+    region = RegionMesh.from_faces(mesh, np.ones(len(mesh.faces), bool))
+    contacts = np.concatenate([path.contacts for path in plan_raster(region, STRATEGY)])
+    inside = np.linalg.norm(contacts[:, :2], axis=1) < radius + 0.001
+    assert (inside & (np.abs(contacts[:, 2]) < 0.015)).any() == worked

@@ -26,6 +26,8 @@ _PROBES, _ROOM = (
     100,
     0.1,
 )  # places at which a sheet is looked at, and of its area, what must be free
+_BORE, _ACROSS = 4.0, 0.3  # footprints, and the share of the area before which there is room
+_HOLLOW = 0.02  # tool radii: the mean way to its middle, about, of what faces that
 _SAMPLES = 0.2  # tool radii, between places on a border
 _DIRECTIONS, _SPREAD = 90, 2  # directions that are told apart; how many either way are alike
 _STRAIGHT = 0.3  # of a sheet's border: what runs one way gives its direction
@@ -43,6 +45,20 @@ def with_room(region: RegionMesh, sheets: Sequence[Part], radius_m: float) -> li
         if float(area[free].sum()) > _ROOM * float(area.sum()):
             kept.append(sheet)
     return kept or list(sheets)
+
+
+def is_bore(region: RegionMesh, part: Part, radius_m: float) -> bool:
+    """Whether a small part is the wall of a hole for a screw: it faces its own middle, and the
+    other wall is nearer than the tool's radius."""
+    mesh = part.mesh
+    area = float(mesh.areas.sum())
+    if area > _BORE * np.pi * radius_m**2:
+        return False
+    outward = np.einsum("fa,fa->f", mesh.normals, mesh.centres - part.centre)
+    if float(mesh.areas @ outward) > -_HOLLOW * radius_m * area:
+        return False
+    free = has_clearance(region.parent, mesh.centres, mesh.normals, radius_m)
+    return float(mesh.areas[free].sum()) < _ACROSS * area
 
 
 def is_flat(part: Part) -> bool:

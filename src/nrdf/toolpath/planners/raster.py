@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, parts_of
-from nrdf.toolpath.planners.flat_sheets import joined_in_planes, with_room
+from nrdf.toolpath.planners.flat_sheets import is_bore, joined_in_planes, with_room
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.rod_strokes import rod_strokes
 from nrdf.toolpath.planners.sheet_lines import line_direction, sheet_lines
@@ -91,6 +91,9 @@ def _sheets(region: RegionMesh, parts: Sequence[Part], strategy: Strategy) -> li
     """All sheets of parts, those of the first part first, large ones before small ones."""
     sheets = [sheet for part in parts for sheet in sheets_of(region, part, strategy)]
     sheets = with_room(region, sheets, strategy.tool_radius_m)
+    holes = [is_bore(region, sheet, strategy.tool_radius_m) for sheet in sheets]
+    if not all(holes):
+        sheets = [sheet for sheet, hole in zip(sheets, holes, strict=True) if not hole]
     if strategy.edge_margin_m > 0.0:
         return sheets
     return joined_in_planes(sheets, strategy.tool_radius_m)

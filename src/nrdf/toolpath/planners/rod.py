@@ -7,9 +7,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.surface.tool_clearance import has_clearance
 from nrdf.toolpath.planners.field_lines import SPECK, Part, checked, closed_border, refined
-from nrdf.toolpath.planners.flat_sheets import is_flat
+from nrdf.toolpath.planners.flat_sheets import is_bore, is_flat
 from nrdf.toolpath.planners.raster import raster_of
 from nrdf.toolpath.planners.reach import reached_from_paths
 from nrdf.toolpath.planners.reeb_graph import touching_faces
@@ -18,8 +17,7 @@ from nrdf.toolpath.planners.sheets import pieces_of
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
-_BORE, _ROOM = 4.0, 0.3  # footprints, and the share of the area before which there is room
-_WIDE, _CAP = 0.5, 0.75
+_WIDE, _CAP = 0.3, 0.75
 """Tool radii: what is left is wider; and squares of them: a flat end is larger."""
 
 
@@ -31,6 +29,7 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     """
     found: list[SurfacePath] = []
     others: list[Part] = []
+    radius = strategy.tool_radius_m
     for part in _touching_parts(region, strategy):
         rods, _ = rods_of(part, strategy)
         strokes = [path for rod in rods for path in strokes_of(region, part, rod, strategy)]
@@ -38,12 +37,14 @@ def plan_rod(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
         if not strokes:
             others += [Part(mesh, closed=part.closed) for mesh in part.mesh.components()]
             continue
-        left = ~reached_from_paths(part, strokes, strategy.tool_radius_m)
+        left = ~reached_from_paths(part, strokes, radius)
         for piece in pieces_of(part, left):
-            if _is_wide(piece, strategy.tool_radius_m) and not _is_bore(region, piece, strategy):
+            if _is_wide(piece, strategy.tool_radius_m) and not is_bore(
+                region, piece, strategy.tool_radius_m
+            ):
                 found += raster_of(region, [piece], strategy, found)
     if found:
-        others = [part for part in others if not _is_bore(region, part, strategy)]
+        others = [part for part in others if not is_bore(region, part, radius)]
     return checked(found + raster_of(region, others, strategy, found), strategy)
 
 
@@ -63,17 +64,6 @@ def _touching_parts(region: RegionMesh, strategy: Strategy) -> list[Part]:
     chosen = [k for k in order if area[k] >= least] or order[:1]
     closed = closed_border(region, strategy)
     return [Part(fine.part(number == k), closed=closed) for k in chosen]
-
-
-def _is_bore(region: RegionMesh, part: Part, strategy: Strategy) -> bool:
-    """Whether a small piece is the wall of a hole for a screw: the other wall is nearer than the
-    tool's radius."""
-    mesh, radius = part.mesh, strategy.tool_radius_m
-    area = float(mesh.areas.sum())
-    if area > _BORE * np.pi * radius**2:
-        return False
-    free = has_clearance(region.parent, mesh.centres, mesh.normals, radius)
-    return float(mesh.areas[free].sum()) < _ROOM * area
 
 
 def _is_wide(part: Part, radius_m: float) -> bool:
