@@ -74,7 +74,6 @@ def test_a_reference_without_normals_will_do_and_progress_is_told():
     assert [row.fault for row in rows] == ["", ""] and told == [(1, 2), (2, 2)]
 
 
-@pytest.mark.xfail(reason="rings leave 1.2 stepovers in the corners of a square plate")
 @pytest.mark.parametrize("trajectory", ["spiral", "contour"])
 def test_spirals_and_contours_have_no_wide_gaps_in_corners(trajectory):
     row = checked(solid(), trajectory=trajectory)

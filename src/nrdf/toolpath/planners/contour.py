@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from nrdf.geometry.polyline_corners import corners_of
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.field_lines import Part, checked, driven, lines_at, parts_of
@@ -13,6 +14,10 @@ from nrdf.toolpath.planners.level_lines import MeshLine, level_lines
 from nrdf.toolpath.strategy import Strategy
 from nrdf.toolpath.surface_path import SurfacePath
 
+_CORNERED = 0.95
+"""Stepovers: in a square corner the largest disc between two rings is 1.17 times as wide as they
+are apart, which must be less than 1.15 stepovers."""
+RING_EDGE = 0.3  # stepovers: triangles cut the corners of rings off, coarse ones more
 _ON_EDGE = 1e-3  # of the stepover: an edge path without margin runs that far inside, on triangles
 
 
@@ -24,7 +29,7 @@ def plan_contour(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     nothing.
     """
     found = []
-    for part in parts_of(region, strategy):
+    for part in parts_of(region, strategy, RING_EDGE):
         found += _in_turn(region, part, ring_lines(part, strategy), strategy)
     return checked(found, strategy)
 
@@ -70,5 +75,15 @@ def ring_distance(part: Part) -> np.ndarray:
 
 
 def ring_lines(part: Part, strategy: Strategy) -> list[MeshLine]:
-    """Level lines of the distance from the border, a stepover apart."""
-    return lines_at(part, ring_distance(part), replace(strategy, origin_m=None))
+    """Level lines of the distance from the border, one after another as `rings_apart` has it."""
+    closer = replace(strategy, origin_m=None, stepover_m=rings_apart(part, strategy))
+    return lines_at(part, ring_distance(part), closer)
+
+
+def rings_apart(part: Part, strategy: Strategy) -> float:
+    """How far rings are apart, m: a stepover, or a little less where the outermost has corners."""
+    stepover = strategy.stepover_m
+    outermost = np.array([strategy.edge_margin_m + 0.5 * stepover])
+    rings = level_lines(part.mesh, ring_distance(part), outermost)
+    cornered = any(len(corners_of(ring.points, 0.5 * stepover, ring.closed)) for ring in rings)
+    return _CORNERED * stepover if cornered else stepover

@@ -102,9 +102,10 @@ class Part:
         ]
 
 
-def parts_of(region: RegionMesh, strategy: Strategy) -> list[Part]:
-    """The parts of a region that are worth a line, the largest first, refined for the stepover."""
-    meshes = refined(region, strategy).components()
+def parts_of(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> list[Part]:
+    """The parts of a region that are worth a line, the largest first, in triangles with edges of so
+    many stepovers."""
+    meshes = refined(region, strategy, edge).components()
     least = SPECK * np.pi * strategy.tool_radius_m**2
     chosen = [m for m in meshes if float(m.areas.sum()) >= least] or meshes[:1]
     closed = closed_border(region, strategy)
@@ -118,9 +119,9 @@ def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None
     return ClosedBorder.of(region, strategy.tool_radius_m)
 
 
-def refined(region: RegionMesh, strategy: Strategy) -> FineMesh:
-    """A region in triangles that are fine enough for the stepover."""
-    return refine(region.mesh.vertices, region.mesh.faces, _EDGE * strategy.stepover_m)
+def refined(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> FineMesh:
+    """A region in triangles that are fine enough for the stepover, with edges of so many."""
+    return refine(region.mesh.vertices, region.mesh.faces, edge * strategy.stepover_m)
 
 
 def even_levels(
@@ -164,13 +165,17 @@ def driven(
         return []
     contacts = [np.concatenate([placed[k][0] for k in run]) for run in kept]
     faces = np.concatenate([placed[k][1] for run in kept for k in run])
-    normals = region.mesh.smooth_normals(
-        np.concatenate(contacts), part.mesh.origin[faces], strategy.tool_radius_m
-    )
+    points, origin = np.concatenate(contacts), part.mesh.origin[faces]
+    if any(line.closed for line in lines):
+        on_mesh = region.mesh.nearest(points, region.mesh.face_normals[origin])
+        points, origin = on_mesh.points, on_mesh.faces
+    normals = region.mesh.smooth_normals(points, origin, strategy.tool_radius_m)
     cuts = np.cumsum([len(points) for points in contacts])[:-1]
     paths = [
-        SurfacePath(points, outward, lines[run[0]].closed)
-        for run, points, outward in zip(kept, contacts, np.split(normals, cuts), strict=True)
+        SurfacePath(placed_on, outward, lines[run[0]].closed)
+        for run, placed_on, outward in zip(
+            kept, np.split(points, cuts), np.split(normals, cuts), strict=True
+        )
     ]
     return snake_order(paths, [lines[run[0]].level for run in kept], strategy.stepover_m)
 

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nrdf.geometry.polyline_corners import resample_with_corners
 from nrdf.geometry.polylines import arc_length, even_arc_lengths, interpolate
 from nrdf.surface.fine_mesh import FineMesh
+
+_RING = 4.0  # spacings around: a smaller ring has four steps
 
 
 @dataclass(frozen=True)
@@ -139,8 +142,13 @@ def cut_where(line: MeshLine, kept: np.ndarray) -> list[MeshLine]:
 
 def resampled(line: MeshLine, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) of a line in even steps of about `spacing_m`, on the mesh; the triangle (n,) of
-    each."""
+    each. Corners of rings, which triangles cut off a little, are made sharp, near the mesh."""
     along = arc_length(line.points)
-    at = even_arc_lengths(float(along[-1]), spacing_m, nearest=True, least=4 if line.closed else 1)
+    if line.closed and along[-1] > _RING * spacing_m:
+        points, at = resample_with_corners(line.points, spacing_m, closed=True)
+    else:
+        least = 4 if line.closed else 1
+        at = even_arc_lengths(float(along[-1]), spacing_m, nearest=True, least=least)
+        points = interpolate(at, along, line.points)
     step = np.clip(np.searchsorted(along, at, side="right") - 1, 0, len(along) - 2)
-    return interpolate(at, along, line.points), line.faces[step]
+    return points, line.faces[step]

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.polyline_corners import resample_with_corners
 from nrdf.geometry.polylines import (
     arc_length,
     interpolate,
@@ -16,7 +17,7 @@ from nrdf.geometry.polylines import (
     total_length,
 )
 from nrdf.surface.region_mesh import RegionMesh
-from nrdf.toolpath.planners.contour import ring_lines
+from nrdf.toolpath.planners.contour import RING_EDGE, ring_lines
 from nrdf.toolpath.planners.field_lines import Part, checked, parts_of
 from nrdf.toolpath.planners.ordering import snake_order
 from nrdf.toolpath.planners.steady_spiral import steady_spiral
@@ -36,7 +37,7 @@ def plan_spiral(region: RegionMesh, strategy: Strategy) -> list[SurfacePath]:
     margin that leaves nothing.
     """
     found: list[SurfacePath] = []
-    for part in parts_of(region, strategy):
+    for part in parts_of(region, strategy, RING_EDGE):
         paths = [
             path for line in _spirals(part, strategy) for path in _placed(region, line, strategy)
         ]
@@ -105,8 +106,7 @@ def _placed(region: RegionMesh, line: np.ndarray, strategy: Strategy) -> list[Su
     more than two spacings."""
     along = arc_length(line)
     near = region.mesh.nearest(line)
-    even = resample(line, strategy.spacing_m, nearest=True)
-    at = np.linspace(0.0, float(along[-1]), len(even))
+    even, at = resample_with_corners(line, strategy.spacing_m)
     found = region.mesh.nearest(even, unit_vectors(interpolate(at, along, near.normals)))
     normals = region.mesh.smooth_normals(found.points, found.faces, strategy.tool_radius_m)
     far = np.flatnonzero(step_lengths(found.points) > _STEP * strategy.spacing_m) + 1

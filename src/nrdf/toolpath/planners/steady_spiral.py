@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from nrdf.geometry.polylines import total_length
+from nrdf.toolpath.planners.contour import rings_apart
 from nrdf.toolpath.planners.distance import factor
 from nrdf.toolpath.planners.field_lines import Part, even_levels
 from nrdf.toolpath.planners.level_lines import MeshLine, level_lines
@@ -27,7 +28,7 @@ def steady_spiral(part: Part, strategy: Strategy) -> np.ndarray | None:
     distance = part.border_distance
     if border is None or distance is None:
         return None
-    stepover, margin = strategy.stepover_m, strategy.edge_margin_m
+    stepover, margin = rings_apart(part, strategy), strategy.edge_margin_m
     most = float(distance.max())
     if most - margin < stepover:
         return None
