@@ -95,6 +95,7 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
         around = _across_band(part, first, last, strategy.stepover_m)
         return around, lines_at(part, around, strategy)
     chosen, best, most = np.zeros(len(mesh.vertices)), list[MeshLine](), -1.0
+    past = most
     ends = ends_of(mesh) if part.outward is not None else None
     if ends is not None and ends.length_m**2 <= _STRIP * float(mesh.areas.sum()):
         ends = None
@@ -113,15 +114,18 @@ def _best_field(part: Part, strategy: Strategy) -> tuple[np.ndarray, list[MeshLi
         for way in ways:
             distance = way(mesh, height)
             lines = lines_at(part, distance, strategy, tail=_TAIL if narrow else SPIKE)
-            value = usual_length(lines) * even_share(mesh, distance)
+            even = even_share(mesh, distance)
+            value = usual_length(lines) * even
             if value > _BETTER * most:
                 chosen, best, most = distance, lines, value
+                past = _length_past_holes(lines) * even
             if value >= _WHOLE * extent:
                 return chosen, best
     if ends is not None and direction is None:
         followed = _across_strip(part, ends)
         lines = lines_at(part, followed, strategy, tail=_TAIL)
-        if usual_length(lines) * even_share(mesh, followed) > _BETTER * most:
+        # What lies in the way of straight lines makes no strip that bends.
+        if usual_length(lines) * even_share(mesh, followed) > _BETTER * past:
             chosen, best = followed, lines
     return chosen, best
 
@@ -133,6 +137,13 @@ def _as_it_is(_: FineMesh, height: np.ndarray) -> np.ndarray:
 def usual_length(lines: Sequence[MeshLine]) -> float:
     """Mean length of the line that a place of the lines is on, m: short pieces count little."""
     length = np.array([total_length(line.points) for line in lines])
+    return float((length**2).sum() / max(float(length.sum()), 1e-300))
+
+
+def _length_past_holes(lines: Sequence[MeshLine]) -> float:
+    """As `usual_length`, m, where the pieces of one level are one line."""
+    level = np.array([line.level for line in lines], int)
+    length = np.bincount(level, [total_length(line.points) for line in lines])
     return float((length**2).sum() / max(float(length.sum()), 1e-300))
 
 
