@@ -5,6 +5,8 @@ import pytest
 
 from builders.regions_of_shapes import arch, plate, ring, tube
 from nrdf.geometry.polylines import total_length
+from nrdf.surface.region_mesh import RegionMesh
+from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.planners.field_lines import parts_of
 from nrdf.toolpath.planners.sheet_lines import sheet_lines, usual_length
 from nrdf.toolpath.strategy import Strategy
@@ -47,3 +49,19 @@ def test_short_pieces_count_little_in_the_usual_length():
     lines = lines_of(plate())
     assert usual_length(lines) == pytest.approx(total_length(lines[0].points), rel=1e-6)
     assert usual_length([]) == 0.0
+
+
+def test_lines_of_a_long_sheet_stay_straight_past_what_stands_in_their_way():
+    x, y = np.meshgrid(np.arange(91), np.arange(13), indexing="ij")
+    corners = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3) * 0.02
+    number = np.arange(len(corners)).reshape(91, 13)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    there = np.ones((90, 12), bool)
+    there[42:44, :6] = there[48:, 8:] = False  # a pod, and a flap
+    faces = np.stack([a, b, c, a, c, d], axis=-1)[there].reshape(-1, 3)
+    mesh = TargetMesh(corners, faces)
+    wing = RegionMesh.from_faces(mesh, np.ones(len(faces), bool))
+    strategy = Strategy(stepover_m=0.03, spacing_m=0.01, tool_radius_m=0.03)
+    (part,) = parts_of(wing, strategy)
+    lines = sheet_lines(wing, part, strategy)
+    assert max(np.ptp(line.points[:, 1]) for line in lines) < 1e-3
