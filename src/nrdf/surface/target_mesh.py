@@ -216,26 +216,30 @@ class TargetMesh:
         normals (p, 3)."""
         size = max(radius_m / _PER_RADIUS, float(np.sqrt(self.face_areas.sum() / _MOST_SAMPLES)))
         key = ("patches", size)
-        if key not in self._found:
-            middles, face, areas = _split_to_size(self.vertices[self.faces], size)
-            real = areas > 0.0  # needles have no side, and no middle that their area could weigh
-            middles, face, areas = middles[real], face[real], areas[real]
-            normals = self.face_normals[face]
-            # One patch for each cell and side that the normals look to.
-            cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
-            side = (normals @ _SIDES.T).argmax(axis=1)
-            # One number for each is sorted much faster than rows of four.
-            count = cell.max(axis=0) + 1
-            key_of = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES)
-            _, number = np.unique(key_of + side, return_inverse=True)
-            number = number.reshape(-1)
-            total = np.bincount(number, areas)
-            centre = [np.bincount(number, areas * middles[:, a]) / total for a in range(3)]
-            weighted = [np.bincount(number, areas * normals[:, a]) for a in range(3)]
-            sums = np.stack(weighted, axis=1)
-            self._found[key] = (cKDTree(np.stack(centre, axis=1)), sums, unit_vectors(sums))
+        with self._lock:
+            if key not in self._found:
+                self._found[key] = self._patches_of_size(size)
         found: tuple[cKDTree, np.ndarray, np.ndarray] = self._found[key]
         return found
+
+    def _patches_of_size(self, size: float) -> tuple[cKDTree, np.ndarray, np.ndarray]:
+        middles, face, areas = _split_to_size(self.vertices[self.faces], size)
+        real = areas > 0.0  # needles have no side, and no middle that their area could weigh
+        middles, face, areas = middles[real], face[real], areas[real]
+        normals = self.face_normals[face]
+        # One patch for each cell and side that the normals look to.
+        cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
+        side = (normals @ _SIDES.T).argmax(axis=1)
+        # One number for each is sorted much faster than rows of four.
+        count = cell.max(axis=0) + 1
+        key_of = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES)
+        _, number = np.unique(key_of + side, return_inverse=True)
+        number = number.reshape(-1)
+        total = np.bincount(number, areas)
+        centre = [np.bincount(number, areas * middles[:, a]) / total for a in range(3)]
+        weighted = [np.bincount(number, areas * normals[:, a]) for a in range(3)]
+        sums = np.stack(weighted, axis=1)
+        return cKDTree(np.stack(centre, axis=1)), sums, unit_vectors(sums)
 
     def submesh(self, face_mask: np.ndarray) -> TargetMesh:
         """The faces of a mask (f,) with the vertices that they use."""
