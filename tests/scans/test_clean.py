@@ -45,6 +45,10 @@ def test_the_larger_of_two_objects_is_kept():
     )
     cleaned = clean_scan(PointCloud(np.vstack([one, two])), UP)
     assert cleaned.others == 1
+    other = clean_scan(PointCloud(np.vstack([one, two])), UP, number=1)
+    assert not set(other.kept) & set(cleaned.kept) and "number 2 of 2" in other.steps[-1].note
+    with pytest.raises(CloudError, match="there is no object 3: the scan has 2"):
+        clean_scan(PointCloud(np.vstack([one, two])), UP, number=2)
     kept = cleaned.kept < len(one)
     assert kept.mean() in (0.0, 1.0), "all of one chair"
     assert "largest of 2 objects" in cleaned.steps[-1].note

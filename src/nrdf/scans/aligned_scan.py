@@ -69,8 +69,7 @@ class AlignedScan:
 
     @property
     def _is_one_sided(self) -> bool:
-        low, high = _ONE_SIDED
-        return low < self.alignment.best.symmetry < high
+        return is_one_sided(self.alignment.best.symmetry)
 
     @cached_property
     def kind(self) -> KindCheck:
@@ -104,6 +103,12 @@ class AlignedScan:
             known = "may be wrong" if self.unit.name else "is unknown"
             found.append(f"the unit {known}: {self.unit.warning}")
         return found
+
+
+def is_one_sided(symmetry: float) -> bool:
+    """Whether the field is shown the mirror image too, by the symmetry of a pose's candidate."""
+    low, high = _ONE_SIDED
+    return low < symmetry < high
 
 
 def pose_scorer(model: CloudEncoder, examples: Sequence[PointCloud] = ()) -> PoseScorer:
@@ -157,19 +162,21 @@ def clean_and_align(
     sensors: np.ndarray | None = None,
     unit: str | None = None,
     skip: Sequence[str] = (),
+    number: int = 0,
 ) -> AlignedScan:
     """Clean and align a scan.
 
     up: (3,) unit in the scan's frame; where it is not given, the floor's, or else searched.
     sensors: (s, 3) where they stood, instead of what the file says. unit: instead of the file's.
-    skip: steps of cleaning to leave out. Raises CloudError where no object is left.
+    skip: steps of cleaning to leave out; number: of the object that is taken, 0 for the largest.
+    Raises CloudError where no object is left.
     """
     scan = replace(
         scan,
         sensors=scan.sensors if sensors is None else sensors,
         unit=scan.unit if unit is None else unit,
     )
-    cleaned = clean_scan(scan, up, skip)
+    cleaned = clean_scan(scan, up, skip, number=number)
     if up is None and cleaned.floor is not None:
         up = cleaned.floor.normal
     alignment = align_scan(scorer, cleaned.cloud, up)

@@ -70,13 +70,14 @@ def clean_scan(
     up: np.ndarray | None = None,
     skip: Collection[str] = (),
     minimum_points: int = 256,
+    number: int = 0,
 ) -> Cleaned:
-    """Thin a scan, and leave out repeated points, the floor, outliers, and all objects but the
-    largest.
+    """Thin a scan, and leave out repeated points, the floor, outliers, and all objects but one.
 
-    up: (3,) unit vector, None if unknown. skip: those of `STEPS` to leave out. Raises CloudError
-    for an unknown step, coordinates that nothing can be computed of, or where fewer than
-    `minimum_points` remain (naming the step that took most).
+    up: (3,) unit vector, None if unknown. skip: those of `STEPS` to leave out. number: of the
+    object that is taken, 0 for the largest. Raises CloudError for an unknown step, coordinates that
+    nothing can be computed of, an object that is not there, or where fewer than `minimum_points`
+    remain (naming the step that took most).
     """
     for name in skip:
         if name not in STEPS:
@@ -123,13 +124,16 @@ def clean_scan(
     if "objects" not in skip:
         apart = separate_objects(scan.points[working], up)
         others = int(apart.max())
-        own = np.flatnonzero(apart == 0)
-        label, number = _objects(scan.points[working[own]], up)
+        if not 0 <= number <= others:
+            raise CloudError(f"there is no object {number + 1}: the scan has {others + 1}")
+        own = np.flatnonzero(apart == number)
+        label, count = _objects(scan.points[working[own]], up)
         largest = np.zeros(len(working), bool)
         largest[own[label == 0]] = True
         mask = largest[_follow(scan.points[kept], scan.points[working])]
-        number += others
-        note = f"not of the largest of {number} objects" if number > 1 else "one object"
+        count += others
+        chosen = f"number {1 + number}" if number else "the largest"
+        note = f"not of {chosen} of {count} objects" if count > 1 else "one object"
         keep("objects", mask, note)
     return Cleaned(scan.select(kept), kept, tuple(steps), floor, others)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import viser
 
 from nrdf.studio.arm_simulation import ArmSimulation
@@ -76,13 +77,13 @@ class Studio(StudioContext):
         with self.lock:
             keys = self.editor.object_keys()
             self._sync_reference(keys)
-            gone = [key for key in self.scene.objects if key not in keys]
-            new = [key for key in keys if key not in self.scene.objects]
+            gone = [key for key in self.scene.objects if key not in keys or self._is_stale(key)]
+            new = [key for key in keys if key not in self.scene.objects or key in gone]
             for key in gone:
                 self.scene.remove(key)
                 self.results.by_target.pop(key, None)
             for key in new:
-                self.scene.add(key, self.editor.paintable(key))
+                self.scene.add(key, self.editor.paintable(key), self._upright(key))
             self._sync_selection()
             self.arm_simulation.check_object()
             if gone or new:
@@ -102,6 +103,19 @@ class Studio(StudioContext):
             side = self.editor.paintable(REFERENCE).longest_side
             self.scene.clear(1.0 / side)
             self.radius_m = _PATCH * side
+
+    def _upright(self, key: str) -> np.ndarray:
+        """(3, 3) from an object's own axes to those in which it stands."""
+        target = self.editor.target(key)
+        placement = None if target is None else target.object.placement
+        return np.eye(3) if placement is None else placement.upright
+
+    def _is_stale(self, key: str) -> bool:
+        """Whether an object is drawn that has other points now, or stands in another way."""
+        drawn = self.scene.objects[key]
+        if drawn.paintable is not self.editor.paintable(key):
+            return True
+        return not np.array_equal(drawn.upright, self._upright(key))
 
     def _sync_selection(self) -> None:
         """Select a region and a process step that exist."""

@@ -23,13 +23,21 @@ from nrdf.studio.model.computing import (
 )
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.teaching import ORIGIN
 from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
 from nrdf.studio.scene.colours import COLOURINGS, similarity_colours
-from nrdf.studio.scene.drawing import colours_of, direction_of, lines_of, region_meshes_of, title_of
+from nrdf.studio.scene.drawing import (
+    colours_of,
+    direction_of,
+    doubts_of,
+    lines_of,
+    region_meshes_of,
+    title_of,
+)
 from nrdf.studio.scene.scene_view import ObjectView, SceneView
 
 if TYPE_CHECKING:
@@ -108,6 +116,9 @@ class StudioContext(ABC):
                 lines = {} if by_similarity else lines_of(self.editor, self.results, key)
                 object_view.draw_lines(lines)
                 object_view.set_label(title_of(self.editor, self.results, key))
+                unsure, removed = doubts_of(self.editor, key)
+                object_view.draw_arrow("front", *(object_view.front if unsure else (None, None)))
+                object_view.draw_removed(removed)
             if REFERENCE in self.scene.objects:
                 ends = direction_of(self.editor, self.region, self.step)
                 self.scene.objects[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
@@ -193,6 +204,38 @@ class StudioContext(ABC):
 
         self._uploads += 1  # each is a job of its own
         self._submit(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
+
+    def read_scan(self, file: Any, unit: str | None, then: Callable[[PlacedScan], None]) -> None:
+        """Read a scan that a browser sent, and give it, cleaned and placed, to `then`.
+
+        Raises CloudError for a file of another type, or too large a one.
+        """
+        name, content = file.name, file.content
+        check_upload(name, len(content))
+        document = self.editor.document
+
+        def work(progress: Progress) -> None:
+            placed = self.results.read_scan(name, content, document, unit, progress)
+            with self.lock:
+                then(placed)
+
+        self._uploads += 1
+        what = f"reading {shown_name(name)}, and finding how it stands"
+        self._submit(f"read {self._uploads}", what, 0.0, work)
+
+    def clean_again(
+        self, scan: PointCloud, skipped: Sequence[str], number: int,
+        then: Callable[[PlacedScan], None],
+    ) -> None:  # fmt: skip
+        """Clean and place a scan again in the background, and give it to `then`."""
+        document = self.editor.document
+
+        def work(progress: Progress) -> None:
+            placed = self.results.clean_again(scan, document, skipped, number, progress)
+            with self.lock:
+                then(placed)
+
+        self._submit("clean", "cleaning the scan again", 0.0, work)
 
     def compare(self, key: str, index: int) -> None:
         """Colour every object by the similarity of its points to a shown point of the reference.

@@ -6,7 +6,7 @@ leaves the studio and the session alive.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing.connection import Connection
@@ -26,8 +26,9 @@ from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
 from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
 from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.model.placing import PlacedScan, Placement, place_scan
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of
-from nrdf.studio.model.uploads import read_upload
+from nrdf.studio.model.uploads import read_sent, read_upload, shown_name
 from nrdf.studio.model.worker import Progress
 from nrdf.toolpath.tool_segments import contact_points
 
@@ -92,6 +93,7 @@ class LocalComputing:
         self._load = load
         self._models: dict[str, Model] = {}
         self._clouds: dict[str, PointCloud] = {}
+        self._poses: Mapping[str, Placement] = {}
         self._paintables: dict[str, PaintableCloud] = {}
         self._encoded: dict[tuple[str, str], EncodedCloud] = {}
         self._features: dict[tuple[str, str, str], np.ndarray] = {}
@@ -103,10 +105,18 @@ class LocalComputing:
 
     def use_objects(self, objects: Iterable[LoadedObject]) -> None:
         """Take the clouds of these objects, and forget all others."""
-        self.use_clouds({loaded.file: loaded.cloud for loaded in objects})
+        kept = list(objects)
+        self.use_clouds({loaded.file: loaded.cloud for loaded in kept}, _placements(kept))
 
-    def use_clouds(self, clouds: Mapping[str, PointCloud | None]) -> None:
-        """Take these clouds, by file; None stands for one that was taken before."""
+    def use_clouds(
+        self, clouds: Mapping[str, PointCloud | None], placements: Mapping[str, Placement]
+    ) -> None:
+        """Take these clouds, by file, and how they stand; None stands for a cloud that was taken
+        before."""
+        turned = {f for f in self._encoded_files if not _same_pose(f, self._poses, placements)}
+        self._poses = dict(placements)
+        self._encoded = {k: kept for k, kept in self._encoded.items() if k[1] not in turned}
+        self._features = {k: kept for k, kept in self._features.items() if k[2] not in turned}
         self._clouds = {f: self._clouds[f] if c is None else c for f, c in clouds.items()}
         self._paintables = {
             f: paintable for f, paintable in self._paintables.items() if f in clouds
@@ -125,6 +135,24 @@ class LocalComputing:
         """`nrdf.studio.model.uploads.read_upload`."""
         progress(0, 1)
         return read_upload(name, content, category, unit)
+
+    def read_scan(
+        self, name: str, content: bytes, model: str, reference: PointCloud, unit: str | None,
+        progress: Progress,
+    ) -> PlacedScan:  # fmt: skip
+        """Read, clean and align a file that a browser sent; model: of the reference's category."""
+        progress(0, 3)
+        scan = read_sent(name, content)
+        progress(1, 3)
+        return place_scan(scan, self._model(model), reference, shown_name(name), unit)
+
+    def clean_again(
+        self, scan: PointCloud, model: str, reference: PointCloud, skipped: Sequence[str],
+        number: int, progress: Progress,
+    ) -> PlacedScan:  # fmt: skip
+        """Clean and align a scan, in metres, again; skipped, number: as of `place_scan`."""
+        progress(0, 1)
+        return place_scan(scan, self._model(model), reference, "the scan", None, skipped, number)
 
     def plan(self, reference: str, region: PaintedRegion, number: int, progress: Progress) -> Plan:
         """Plan a process step of a region on the reference."""
@@ -161,7 +189,12 @@ class LocalComputing:
         """Transfer the prepared processes to a target; marked: regions painted on it by hand."""
         progress(0, 1)
         target_cloud = self._encode(target)
-        return self._prepared.transfer(target_cloud, marked=dict(marked), progress=progress)
+        placement = self._poses.get(target)
+        doubts = () if placement is None or placement.confirmed else placement.warnings
+        return self._prepared.transfer(
+            target_cloud, marked=dict(marked), progress=progress,
+            target_warnings=doubts if placement is not None else None,
+        )  # fmt: skip
 
     def correspondence_features(
         self, reference: str, files: Mapping[str, str], progress: Progress
@@ -181,6 +214,10 @@ class LocalComputing:
         return CorrespondenceFeatures(features, own, cloud.nearest_working)
 
     @property
+    def _encoded_files(self) -> set[str]:
+        return {file for _, file in self._encoded}
+
+    @property
     def _prepared(self) -> ProcessTransfer:
         assert self._transfer_process is not None, "`prepare` comes first"
         return self._transfer_process[1]
@@ -198,7 +235,11 @@ class LocalComputing:
     def _encode(self, file: str) -> EncodedCloud:
         model = self._prepared.model
         if (_name(model), file) not in self._encoded:
-            self._encoded[_name(model), file] = model.encode(self._clouds[file])
+            placement = self._poses.get(file)
+            pose = (
+                () if placement is None else (placement.pose.similarity, placement.pose.one_sided)
+            )
+            self._encoded[_name(model), file] = model.encode(self._clouds[file], *pose)
         return self._encoded[_name(model), file]
 
 
@@ -212,11 +253,14 @@ class ChildProcessComputing:
         self._load = load
         self._child: ChildProcess | None = None
         self._wanted: dict[str, PointCloud] = {}
+        self._placements: dict[str, Placement] = {}
         self._known: set[str] = set()
 
     def use_objects(self, objects: Iterable[LoadedObject]) -> None:
         """As of `LocalComputing`."""
-        self._wanted = {loaded.file: loaded.cloud for loaded in objects}
+        kept = list(objects)
+        self._wanted = {loaded.file: loaded.cloud for loaded in kept}
+        self._placements = _placements(kept)
 
     def call(self, name: str, *args: Any, progress: Progress) -> Any:
         """As of `LocalComputing`. Raises ComputingProcessEnded if the process ends before it
@@ -227,7 +271,7 @@ class ChildProcessComputing:
         sent = {f: None if f in self._known else c for f, c in self._wanted.items()}
         self._known = set(sent)
         try:
-            return self._child.request((sent, name, args), progress)
+            return self._child.request((sent, self._placements, name, args), progress)
         except ComputingProcessEnded:
             self.end()
             raise
@@ -244,11 +288,24 @@ def _name(model: Model) -> str:
     return str(model.metadata.get("name", model.category))
 
 
+def _placements(objects: Iterable[LoadedObject]) -> dict[str, Placement]:
+    return {loaded.file: loaded.placement for loaded in objects if loaded.placement is not None}
+
+
+def _same_pose(file: str, one: Mapping[str, Placement], other: Mapping[str, Placement]) -> bool:
+    """Whether an object stands in the same way by both."""
+    ways = [
+        None if file not in which else which[file].pose.similarity.T_scan_canonical.tobytes()
+        for which in (one, other)
+    ]
+    return ways[0] == ways[1]
+
+
 def without_clouds(document: Document) -> Document:
     """The document without its clouds, to be sent: objects are named by their files."""
 
     def without_cloud(loaded: LoadedObject) -> LoadedObject:
-        return replace(loaded, cloud=_NOT_SENT)
+        return replace(loaded, cloud=_NOT_SENT, scan=None)
 
     reference = None if document.reference is None else without_cloud(document.reference)
     targets = tuple(replace(t, object=without_cloud(t.object)) for t in document.targets)
@@ -269,7 +326,7 @@ def _serve(pipe: Connection, load: Callable[[str], Model]) -> None:
     while True:
         request = pipe.recv()
         if request is not None:  # else cancelled after it was answered
-            clouds, name, args = request
-            computing.use_clouds(clouds)
+            clouds, placements, name, args = request
+            computing.use_clouds(clouds, placements)
             call = partial(computing.call, name, *args, progress=progress_of(pipe))
             answer(pipe, call)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.io.cloud import PointCloud
+from nrdf.studio.model.placing import Placement
 
 REFERENCE = "reference"
 """The key of the reference; targets have their names."""
@@ -31,11 +32,17 @@ class PaintedRegion:
 
 @dataclass(frozen=True)
 class LoadedObject:
-    """An object: its name, its cloud in metres, and its file in the session's folder."""
+    """An object: its name, its cloud in metres, and its file in the session's folder.
+
+    placement: how it stands, None where that is +X forward and +Y up. scan: what it was cleaned
+    out of, None where that is itself.
+    """
 
     name: str
     cloud: PointCloud
     file: str = ""
+    placement: Placement | None = None
+    scan: LoadedObject | None = None
 
 
 @dataclass(frozen=True)

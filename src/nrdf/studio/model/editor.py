@@ -15,8 +15,15 @@ from nrdf.io.cloud import PointCloud
 from nrdf.io.file_names import safe_file_name
 from nrdf.process.bound_knowledge import BoundKnowledge, overlaps
 from nrdf.regions.region import region_name_fault
-from nrdf.studio.model.document import REFERENCE, Document, PaintedRegion, Target
+from nrdf.studio.model.document import (
+    REFERENCE,
+    Document,
+    LoadedObject,
+    PaintedRegion,
+    Target,
+)
 from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.model.placing import PlacedScan, Placement
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.teaching import changed_step, new_step, painted_regions_of
 from nrdf.studio.model.uploads import shown_name, thinned_reference
@@ -92,14 +99,41 @@ class Editor:
         """Remove everything; undo brings it back."""
         self.session.change(Document(self.document.category, model=self.document.model))
 
-    def add_target(self, name: str, cloud: PointCloud) -> str:
-        """Add a target, in metres; its name."""
+    def add_target(self, name: str, cloud: PointCloud, placed: PlacedScan | None = None) -> str:
+        """Add a target, in metres; its name. placed: the scan that it is of, unless it has +X
+        forward and +Y up."""
         taken = [REFERENCE, *(t.object.name for t in self.document.targets)]
         name = _free(safe_file_name(PurePath(shown_name(name)).stem, "target"), taken)
-        target = Target(self.session.store(name, cloud))
+        target = Target(self._stored(name, cloud, placed))
         document = self.document
         self.session.change(replace(document, targets=(*document.targets, target)))
         return name
+
+    def place_target(self, key: str, placement: Placement) -> None:
+        """Set how a target stands."""
+        target = self.target(key)
+        assert target is not None  # the page offers those that there are
+        loaded = replace(target.object, placement=placement)
+        self.session.change(self.document.with_target(key, object=loaded))
+
+    def replace_target(self, key: str, placed: PlacedScan) -> None:
+        """Replace what of its scan a target is. Corrections, which were of other points, go."""
+        target = self.target(key)
+        assert target is not None  # the page offers those that there are
+        loaded = self._stored(key, placed.cloud, placed, target.object.scan)
+        self.session.change(self.document.with_target(key, object=loaded, corrected={}))
+
+    def _stored(
+        self, name: str, cloud: PointCloud, placed: PlacedScan | None,
+        scan: LoadedObject | None = None,
+    ) -> LoadedObject:  # fmt: skip
+        """An object in the session's folder, with the scan that it was cleaned out of."""
+        loaded = self.session.store(name, cloud)
+        if placed is None:
+            return loaded
+        if scan is None and len(placed.scan) > len(cloud):
+            scan = self.session.store(f"{name} scan", placed.scan)
+        return replace(loaded, placement=placed.placement, scan=scan)
 
     def remove_target(self, key: str) -> None:
         """Remove a target."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.io.cloud import PointCloud
 from nrdf.process.limits import LOW_CONFIDENCE
+from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
@@ -20,6 +22,7 @@ from nrdf.studio.model.computing import (
 )
 from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
 from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.worker import Progress
 
 
@@ -61,6 +64,27 @@ class ResultCache:
             "read", name, content, category, unit, progress=progress
         )
         return cloud
+
+    def read_scan(
+        self, name: str, content: bytes, document: Document, unit: str | None, progress: Progress
+    ) -> PlacedScan:
+        """A file that a browser sent, as of `place_scan`, for a document's reference."""
+        reference, model = _aligned_by(document)
+        placed: PlacedScan = self._computing.call(
+            "read_scan", name, content, model, reference, unit, progress=progress
+        )
+        return placed
+
+    def clean_again(
+        self, scan: PointCloud, document: Document, skipped: Sequence[str], number: int,
+        progress: Progress,
+    ) -> PlacedScan:  # fmt: skip
+        """A scan, in metres, as of `place_scan`, for a document's reference."""
+        reference, model = _aligned_by(document)
+        placed: PlacedScan = self._computing.call(
+            "clean_again", scan, model, reference, skipped, number, progress=progress
+        )
+        return placed
 
     # --- plans on the reference
 
@@ -174,6 +198,14 @@ class ResultCache:
             "correspondence_features", document.reference.file, files, progress=progress
         )
         return features
+
+
+def _aligned_by(document: Document) -> tuple[PointCloud, str]:
+    """What scans are aligned by: the reference, and the name of the model."""
+    if document.reference is None:
+        raise ProcessError("there is no reference yet: load one in step 1")
+    model = choose_model(document.category, document.model, allow_unusual=True).name
+    return document.reference.cloud, model
 
 
 def _objects(document: Document) -> list[LoadedObject]:

@@ -101,6 +101,7 @@ class Session:
         document = self.document
         objects = [target.object for target in document.targets]
         objects += [] if document.reference is None else [document.reference]
+        objects += [loaded.scan for loaded in objects if loaded.scan is not None]
         for path in (self.folder / CLOUDS).glob("cloud-*.ply"):
             if path.name not in {loaded.file for loaded in objects}:
                 path.unlink(missing_ok=True)

@@ -30,10 +30,11 @@ from nrdf.io.schema import StrictModel, validation_messages
 from nrdf.process.new_knowledge import KINDS
 from nrdf.regions.region import region_name_fault
 from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
+from nrdf.studio.model.placement_file import PlacementContent
 
 FILE = "session.json"
 CLOUDS = "clouds"
-VERSION = 1
+VERSION = 2
 DAMAGED = "damaged"
 _LARGEST_FILE = 1 << 28
 _CLOUD_FILE = r"cloud-\d{1,9}\.ply"
@@ -102,6 +103,8 @@ class _Step(_Shown):
 class _Object(StrictModel):
     name: _Name
     file: str = Field(pattern=f"^{_CLOUD_FILE}$")
+    placement: PlacementContent | None = None
+    scan: _Object | None = None
 
 
 class _Region(StrictModel):
@@ -224,7 +227,9 @@ def _steps(region: _Region) -> tuple[dict[str, Any], ...]:
 def _read_object(folder: Path, content: _Object) -> LoadedObject:
     cloud = read_cloud(folder / CLOUDS / content.file)
     check_cloud(cloud, MINIMUM_POINTS)
-    return LoadedObject(content.name, cloud, content.file)
+    placement = None if content.placement is None else content.placement.placement()
+    scan = None if content.scan is None else _read_object(folder, content.scan)
+    return LoadedObject(content.name, cloud, content.file, placement, scan)
 
 
 def _read_target(folder: Path, content: _Target) -> Target:
@@ -244,8 +249,13 @@ def _mask(indices: list[int], loaded: LoadedObject, name: str) -> np.ndarray:
 def _plain(document: Document) -> dict[str, Any]:
     """A document as its file holds it; regions as indices."""
 
-    def loaded(of: LoadedObject) -> dict[str, str]:
-        return {"name": of.name, "file": of.file}
+    def loaded(of: LoadedObject) -> dict[str, Any]:
+        plain: dict[str, Any] = {"name": of.name, "file": of.file}
+        if of.placement is not None:
+            plain["placement"] = PlacementContent.of(of.placement).model_dump(mode="json")
+        if of.scan is not None:
+            plain["scan"] = loaded(of.scan)
+        return plain
 
     return {
         "version": VERSION,

@@ -26,9 +26,19 @@ _LONGEST_NAME = 60
 def read_upload(name: str, content: bytes, category: str, unit: str | None = None) -> PointCloud:
     """The cloud, in metres, of a file that a browser sent.
 
-    The name is for messages, and its ending for the format; it is not used as a path. unit: where
-    the file does not say it. Raises CloudError for a file that is too large, of another type, or
-    that `nrdf.io.cloud.read_cloud` refuses; ProcessError where nothing tells the unit.
+    unit: where the file does not say it. Raises what `read_sent` raises, and ProcessError where
+    nothing tells the unit.
+    """
+    cloud = read_sent(name, content)
+    return in_metres(cloud, known_unit(cloud, unit, category, shown_name(name), "the unit"))
+
+
+def read_sent(name: str, content: bytes) -> PointCloud:
+    """The cloud of a file that a browser sent, as it is.
+
+    The name is for messages, and its ending for the format; it is not used as a path. Raises
+    CloudError for a file that is too large, of another type, or that `nrdf.io.cloud.read_cloud`
+    refuses.
     """
     ending = check_upload(name, len(content))
     shown = shown_name(name)
@@ -40,7 +50,7 @@ def read_upload(name: str, content: bytes, category: str, unit: str | None = Non
             check_cloud(cloud, MINIMUM_POINTS)
         except NrdfError as error:
             raise type(error)(str(error).replace(str(path), shown)) from None
-    return in_metres(cloud, known_unit(cloud, unit, category, shown, "the unit"))
+    return cloud
 
 
 def check_upload(name: str, size: int) -> str:

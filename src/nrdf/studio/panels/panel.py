@@ -14,6 +14,7 @@ from nrdf.studio.panels.reference import ReferenceTab
 from nrdf.studio.panels.regions import RegionsTab
 from nrdf.studio.panels.robot import RobotTab
 from nrdf.studio.panels.save import SaveTab
+from nrdf.studio.panels.standing import unconfirmed
 from nrdf.studio.panels.targets import TargetsTab
 
 NO_REGION = "(none yet)"
@@ -134,6 +135,10 @@ def next_step(context: StudioContext) -> str:
             "describe the process of each in **3 Process**; then go to **4 Targets**."
         )
     targets = context.editor.object_keys()[1:]
+    if unsure := unconfirmed(context):
+        return (
+            f"say in **4 Targets** how {unsure[0]} stands: press *It stands like this*, or turn it."
+        )
     waiting = [key for key in targets if not results.is_current(key)]
     if waiting:
         return f"in **4 Targets**, press *Transfer the process* ({', '.join(waiting)})."

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 from nrdf.bundled import KNOWLEDGE, REFERENCE
 from nrdf.errors import ProcessError
 from nrdf.field.registration import REGISTRATION
+from nrdf.field.zoo import list_models
 from nrdf.geometry.units import METRES
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.model_choice import choose_model
 from nrdf.studio.context import StudioContext
+from nrdf.studio.model.document import Document
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs, PanelEvent
 
@@ -61,9 +63,7 @@ class ReferenceTab:
         sides = " × ".join(f"{1e3 * side:.0f}" for side in size)
         self.status.content = (
             f"**{reference.name}**, category {document.category}: {len(reference.cloud)} points, "
-            f"{sides} mm. "
-            + ("Regions are found by registration. " if document.model == REGISTRATION else "")
-            + "Every change is saved at once."
+            f"{sides} mm. " + _about_model(document) + "Every change is saved at once."
         )
 
     def _open(self) -> None:
@@ -115,6 +115,18 @@ class ReferenceTab:
 
         self.inputs.on(yes.on_click, start)
         self.inputs.on(no.on_click, lambda _: modal.close())
+
+
+def _about_model(document: Document) -> str:
+    """What finds the regions where that is not the category's own model, in a sentence."""
+    if document.model != REGISTRATION:
+        return ""
+    if any(entry.category == document.category for entry in list_models()):
+        return "Regions are found by registration. "
+    return (
+        f"⚠ There is no model for the category '{document.category}': regions are found by "
+        "registration, which serves any kind. "
+    )
 
 
 def unit_of(shown: str) -> str | None:

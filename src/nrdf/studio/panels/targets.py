@@ -10,12 +10,15 @@ from nrdf.process.limits import LOW_CONFIDENCE, Limits
 from nrdf.process.transfer_result import TransferResult
 from nrdf.reports.transfer_report import shares_in_words, transfer_report
 from nrdf.studio.context import StudioContext
+from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs
 from nrdf.studio.panels.reference import AS_IN_FILE, unit_of
+from nrdf.studio.panels.standing import StandingFolder
 from nrdf.studio.scene.colours import COLOURINGS
 
 ALL = "all of them"
+STANDS = ("in any pose", "+X forward, +Y up")
 
 
 class TargetsTab:
@@ -28,7 +31,11 @@ class TargetsTab:
         self.bundled = gui.add_dropdown("Bundled chair", (*BUNDLED[1:], ALL))
         self.add = gui.add_button("Add the bundled chair")
         self.unit = gui.add_dropdown("Unit of a file", (AS_IN_FILE, *METRES))
+        self.stands = gui.add_dropdown(
+            "It stands", STANDS, hint="A scan in any pose is cleaned, and its pose is proposed."
+        )
         self.upload = gui.add_upload_button("Add a file …", mime_type=",".join(ENDINGS))
+        self.standing = StandingFolder(context, inputs)
         self.transfer = gui.add_button("Transfer the process", color="green")
         self.status = gui.add_markdown("")
         self.shown = gui.add_dropdown("Beside the reference", (ALL,))
@@ -58,6 +65,7 @@ class TargetsTab:
         shown = context.shown_target
         inputs.set_value(self.shown, shown if shown in keys else ALL)
         inputs.set_value(self.colours, context.colouring)
+        self.standing.refresh()
         self.status.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."
 
     def _about(self, key: str) -> str:
@@ -75,7 +83,10 @@ class TargetsTab:
     def _load(self, file: Any) -> None:
         self._need_reference()
         category, unit = self.context.editor.document.category, unit_of(self.unit.value)
-        self.context.read(file, category, unit, lambda cloud: self._add_cloud(file.name, cloud))
+        if self.stands.value == STANDS[0]:
+            self.context.read_scan(file, unit, lambda placed: self._add_scan(file.name, placed))
+        else:
+            self.context.read(file, category, unit, lambda cloud: self._add_cloud(file.name, cloud))
 
     def _need_reference(self) -> None:
         if self.context.editor.document.reference is None:
@@ -84,6 +95,12 @@ class TargetsTab:
     def _add_cloud(self, name: str, cloud: Any) -> None:
         self._need_reference()
         self.context.editor.add_target(name, cloud)
+        self.context.shown_target = None
+        self.context.sync()
+
+    def _add_scan(self, name: str, placed: PlacedScan) -> None:
+        self._need_reference()
+        self.context.editor.add_target(name, placed.cloud, placed)
         self.context.shown_target = None
         self.context.sync()
 

@@ -9,10 +9,12 @@ import numpy as np
 from nrdf.reports.job_folder import panel_of
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
+from nrdf.studio.model.placing import removed_points
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.scene.colours import confidence_colours, painted_colours
 from nrdf.surface.target_mesh import TargetMesh
 
+_MOST_REMOVED = 20_000
 _DEEP, _PALE = 0.5, 0.62
 """Shares of a region's colour in the lines on it, and in the region where found are lines."""
 
@@ -108,6 +110,18 @@ def title_of(editor: Editor, results: ResultCache, key: str) -> str:
     if result is None or not result.uncertain_regions:
         return key
     return f"{key}: check {', '.join(result.uncertain_regions)}"
+
+
+def doubts_of(editor: Editor, key: str) -> tuple[bool, np.ndarray]:
+    """Whether nobody has confirmed yet how an object stands, and the points (k, 3), m, that are
+    shown until then: those that cleaning removed, thinned."""
+    target = editor.target(key)
+    placement = None if target is None else target.object.placement
+    if target is None or placement is None or placement.confirmed:
+        return False, np.zeros((0, 3))
+    scan = target.object.scan
+    removed = np.zeros((0, 3)) if scan is None else removed_points(scan.cloud, target.object.cloud)
+    return True, removed[:: 1 + len(removed) // _MOST_REMOVED]
 
 
 def direction_of(editor: Editor, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:

@@ -31,6 +31,8 @@ _LIFT = 1.4  # of lines above points, in spacings
 _ON_MESH = 0.0015  # of lines above a mesh, in sides of the object; regions lie half as high
 _LIGHT = np.array([0.62, 0.70, 0.35])
 """Direction to the light: front, above, right."""
+_REMOVED = (226, 140, 130)
+"""Colour of points that cleaning removed."""
 _DARKEST = 0.58  # brightness of a point that faces away from the light
 
 
@@ -38,11 +40,15 @@ class ObjectView:
     """One object in the scene: its pose, and what is drawn of it."""
 
     def __init__(
-        self, scene_view: SceneView, key: str, number: int, paintable: PaintableCloud
-    ) -> None:
+        self, scene_view: SceneView, key: str, number: int, paintable: PaintableCloud,
+        upright: np.ndarray,
+    ) -> None:  # fmt: skip
         self.key, self.paintable, self.scene_view = key, paintable, scene_view
         self.path = f"/object{number}"
-        self.offset, self._rotation = np.zeros(3), np.eye(3)
+        self.offset, self._rotation, self.upright = np.zeros(3), upright, upright
+        stands = paintable.points @ upright.T
+        self.low, self.high = stands.min(axis=0), stands.max(axis=0)
+        """Lowest and highest corner (3,) of the object as it stands, m."""
         self.removed = False
         scene = scene_view.server.scene
         self.frame = scene.add_frame(self.path, show_axes=False)
@@ -56,6 +62,7 @@ class ObjectView:
             precision="float32",
         )
         self._regions: list[viser.SceneNodeHandle] = []
+        self._removed: viser.SceneNodeHandle | None = None
         self._mesh: viser.SceneNodeHandle | None = None
         self.draw_surface(None)
         size = (paintable.high - paintable.low) * scene_view.units_per_m
@@ -74,7 +81,7 @@ class ObjectView:
         self.label = scene.add_label(
             f"{self.path}/label",
             key,
-            position=tuple(self.top * scene_view.units_per_m + np.array([0.0, _ABOVE, 0.0])),
+            position=tuple(self.top * scene_view.units_per_m + upright.T @ [0.0, _ABOVE, 0.0]),
             anchor="bottom-center",
         )
         self._lines: list[viser.SceneNodeHandle] = []
@@ -84,20 +91,28 @@ class ObjectView:
     def corners(self) -> np.ndarray:
         """Corners (8, 3) of the object's bounding box in the scene, with the label above it."""
         scale = self.scene_view.units_per_m
-        low, high = self.paintable.low * scale, self.paintable.high * scale
+        low, high = self.low * scale, self.high * scale
         high[1] += _ABOVE
         choice = np.array(list(product((False, True), repeat=3)))
-        return np.where(choice, high, low) @ self._rotation.T + self.offset
+        stands = np.where(choice, high, low) @ self.upright
+        return stands @ self._rotation.T + self.offset
 
     @property
     def top(self) -> np.ndarray:
         """The point (3,) above the middle of the object, at its full height, m."""
-        middle = (self.paintable.low + self.paintable.high) / 2
-        return np.array([middle[0], self.paintable.high[1], middle[2]])
+        middle = (self.low + self.high) / 2
+        return np.asarray(self.upright.T @ [middle[0], self.high[1], middle[2]])
+
+    @property
+    def front(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (3,) of an arrow on the floor, from under the object out of its front, m."""
+        start = np.array([self.high[0], self.low[1], (self.low[2] + self.high[2]) / 2])
+        out = np.array([0.3 * self.paintable.longest_side, 0.0, 0.0])
+        return self.upright.T @ start, self.upright.T @ (start + out)
 
     def place(self, offset: np.ndarray, rotation: np.ndarray | None = None) -> None:
-        """Move the object: offset (3,) in the scene, rotation (3, 3) from its own frame to it."""
-        self.offset, self._rotation = offset, np.eye(3) if rotation is None else rotation
+        """Move the object: offset (3,) in the scene; rotation (3, 3), or `upright`."""
+        self.offset, self._rotation = offset, self.upright if rotation is None else rotation
         self.frame.position = tuple(offset)
         self.frame.wxyz = tuple(quaternions_wxyz(self._rotation))
 
@@ -106,7 +121,8 @@ class ObjectView:
 
         Above a mesh only points that have a colour of their own are drawn.
         """
-        facing = 0.5 + 0.5 * self.paintable.normals @ (_LIGHT / np.linalg.norm(_LIGHT))
+        light = self.upright.T @ (_LIGHT / np.linalg.norm(_LIGHT))
+        facing = 0.5 + 0.5 * self.paintable.normals @ light
         shade = _DARKEST + (1 - _DARKEST) * facing
         shaded = (colours * shade[:, None]).astype(np.uint8)
         if self._mesh is not None:
@@ -125,6 +141,22 @@ class ObjectView:
         if self._mesh is not None:
             self._mesh.remove()
         self._mesh = None if shown is None else self._add_mesh("mesh", shown, BARE)
+
+    def draw_removed(self, points: np.ndarray) -> None:
+        """Draw points (k, 3), m, that cleaning removed, in place of earlier ones."""
+        if self._removed is not None:
+            self._removed.remove()
+        self._removed = None
+        if len(points):
+            factor = self.scene_view.units_per_m
+            self._removed = self.scene_view.server.scene.add_point_cloud(
+                f"{self.path}/removed",
+                (points * factor).astype(np.float32),
+                np.full((len(points), 3), _REMOVED, np.uint8),
+                point_size=0.6 * _SIZE * self.paintable.surface.spacing * factor,
+                point_shape="circle",
+                precision="float32",
+            )
 
     def draw_regions(self, regions: Mapping[str, tuple[Triangles, np.ndarray]]) -> None:
         """Draw the meshes of regions by name, m, in place of all earlier ones, each with a colour
@@ -252,10 +284,13 @@ class SceneView:
         self.objects.clear()
         self.units_per_m = units_per_m
 
-    def add(self, key: str, paintable: PaintableCloud) -> ObjectView:
-        """Add an object arm_points the others."""
+    def add(
+        self, key: str, paintable: PaintableCloud, upright: np.ndarray | None = None
+    ) -> ObjectView:
+        """Add an object. upright: (3, 3) from its axes to those in which it stands, its own."""
         self._made += 1
-        object_view = ObjectView(self, key, self._made, paintable)
+        own = np.eye(3) if upright is None else upright
+        object_view = ObjectView(self, key, self._made, paintable, own)
         self.objects[key] = object_view
         return object_view
 
@@ -275,8 +310,7 @@ class SceneView:
             object_view.frame.visible = key in shown
             if key not in shown:
                 continue
-            paintable = object_view.paintable
-            low, high = paintable.low * self.units_per_m, paintable.high * self.units_per_m
+            low, high = object_view.low * self.units_per_m, object_view.high * self.units_per_m
             # +Z is the object's right-hand side: on the left when seen from the front.
             object_view.place(np.array([-(low[0] + high[0]) / 2, -low[1], right - high[2]]))
             right -= high[2] - low[2] + gap
