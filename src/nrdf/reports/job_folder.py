@@ -117,13 +117,7 @@ def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
     """The target's mesh, upright, with its regions' and the lines of its tool paths, for a picture;
     the target's points where it has no mesh."""
     turn = np.eye(3) if result.pose is None else result.pose.rotation
-    lines: dict[str, list[np.ndarray]] = {}
-    for step in result.paths:
-        if step.path is not None:
-            work = [s for s in step.path.segments if s.kind == "process"]
-            strategy = strategy_of(step.process)
-            drawn = lines.setdefault(step.region, [])
-            drawn.extend(contact_points(segment, strategy) @ turn for segment in work)
+    lines = {n: [line @ turn for line in drawn] for n, drawn in lines_of_paths(result).items()}
     if result.surface is not None:
         found = {n: r.mesh.mesh for n, r in result.regions.items() if r.mesh is not None}
         regions = {name: Mesh(mesh.vertices @ turn, mesh.faces) for name, mesh in found.items()}
@@ -133,6 +127,18 @@ def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:
     target = result.target
     normals = None if target.normals is None else target.normals @ turn
     return Panel(title, target.points @ turn, normals, points, note, lines)
+
+
+def lines_of_paths(result: TransferResult) -> dict[str, list[np.ndarray]]:
+    """The lines of tool paths on the surface by region, each (m, 3), m, in the target's frame."""
+    lines: dict[str, list[np.ndarray]] = {}
+    for step in result.paths:
+        if step.path is not None:
+            work = [s for s in step.path.segments if s.kind == "process"]
+            strategy = strategy_of(step.process)
+            drawn = lines.setdefault(step.region, [])
+            drawn.extend(contact_points(segment, strategy) for segment in work)
+    return lines
 
 
 def _knowledge(result: TransferResult, folder: Path, origin: Mapping[str, Any]) -> Knowledge:

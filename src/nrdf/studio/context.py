@@ -42,6 +42,7 @@ from nrdf.studio.scene.scene_view import ObjectView, SceneView
 
 if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
+    from nrdf.process.bound_knowledge import BoundKnowledge
 
 log = logging.getLogger(__name__)
 
@@ -222,6 +223,18 @@ class StudioContext(ABC):
         self._uploads += 1
         what = f"reading {shown_name(name)}, and finding how it stands"
         self._submit(f"read {self._uploads}", what, 0.0, work)
+
+    def read_knowledge(self, file: Any, then: Callable[[BoundKnowledge], None]) -> None:
+        """Read a ZIP archive of knowledge that a browser sent, and give it to `then`."""
+        name, content = file.name, file.content
+
+        def work(progress: Progress) -> None:
+            bound = self.results.read_knowledge(name, content, progress)
+            with self.lock:
+                then(bound)
+
+        self._uploads += 1
+        self._submit(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
 
     def clean_again(
         self, scan: PointCloud, skipped: Sequence[str], number: int,

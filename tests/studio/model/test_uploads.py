@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -9,7 +12,13 @@ from builders.taught_box import cloud
 from nrdf.errors import CloudError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.studio.model import uploads
-from nrdf.studio.model.uploads import read_upload, shown_name, thinned_reference
+from nrdf.studio.model.uploads import (
+    LARGEST_UPLOAD,
+    read_knowledge_zip,
+    read_upload,
+    shown_name,
+    thinned_reference,
+)
 
 
 @pytest.fixture
@@ -68,3 +77,31 @@ def test_names_are_short_and_printable():
 def test_a_dense_reference_is_thinned_as_the_model_does():
     dense = PointCloud(np.random.default_rng(0).normal(size=(20_000, 3)), unit="m")
     assert len(thinned_reference(dense)) == 16_384
+
+
+def archive(**files):
+    """A ZIP archive."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in files.items():
+            made.writestr(name, content)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"PK no archive", "k.zip is no ZIP archive that can be read; give knowledge.zip"),
+        (archive(**{"a/box.ply": "ply"}), "k.zip holds 0 knowledge files"),
+        (archive(**{"a.yaml": "", "b/c.yml": ""}), "k.zip holds 2 knowledge files"),
+        (archive(**{"a/x.yaml": "", "b/x.yaml": ""}), "x.yaml' is no name that is taken"),
+        (archive(**{"con\n.yaml": ""}), "is no name that is taken"),
+        (archive(**{"x.yaml": "category: 3"}), "^x.yaml"),
+        (archive(**{str(i): "" for i in range(601)}), "holds 601 files; at most 600"),
+        (archive(**{"x.yaml": bytes(LARGEST_UPLOAD + 1)}), "at most 600 of together 128 MiB"),
+        (archive(**{"x.yaml": "a" * 5000})[:-2000], "no ZIP archive"),
+    ],
+)  # fmt: skip
+def test_archives_that_hold_no_knowledge_are_refused(content, said):
+    with pytest.raises(ProcessError, match=said):
+        read_knowledge_zip("../k.zip", content)

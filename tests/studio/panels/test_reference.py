@@ -9,6 +9,7 @@ import numpy as np
 from nrdf.io.cloud import PointCloud
 from nrdf.studio.model import uploads
 from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.model.saving import save_knowledge, zipped
 
 
 def test_files_that_cannot_be_read(page, monkeypatch):
@@ -57,3 +58,16 @@ def test_a_kind_without_a_model_is_served_by_registration(page, tmp_path):
     folder = page.editor.session.folder
     write_document(folder, document)
     assert read_document(folder).model == "registration"
+
+
+def test_knowledge_that_was_saved_is_opened_again(page):
+    content = zipped(save_knowledge(page.editor))
+    masks = [region.mask for region in page.editor.document.regions]
+    page.editor.new_session()
+    page.does(page.studio.restore)
+    load = page.studio.panel.reference._load_knowledge
+    assert "no ZIP archive" in page.does(load, SimpleNamespace(name="k.zip", content=b"PK"))
+    assert page.does(load, SimpleNamespace(name="k.zip", content=content)) == ""
+    regions = page.editor.document.regions
+    assert [region.name for region in regions] == ["top", "front"]
+    assert all((r.mask == mask).all() for r, mask in zip(regions, masks, strict=True))

@@ -14,6 +14,7 @@ from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session_file import read_document
 from nrdf.studio.panels.panel import next_step
 from nrdf.studio.panels.standing import BY_HAND
+from nrdf.studio.scene.drawing import lines_of
 
 
 @pytest.fixture
@@ -90,4 +91,6 @@ def test_tool_paths_are_in_the_frame_of_the_scan(scanned):
     seat = chair.points[regions["seat"]].mean(axis=0) - [0.0, chair.points[:2500, 1].min(), 0.0]
     seat = ANY @ seat + [2.0, 0.05, -0.4]
     assert there.mean(axis=0) == pytest.approx(seat, abs=0.05)
+    lines = np.concatenate(lines_of(scanned.editor, scanned.studio.results, "scan")["seat"][0])
+    assert lines.mean(axis=0) == pytest.approx(seat, abs=0.08), "and so are those that are drawn"
     assert result.pose is not None and result.pose.rotation[:, 1] @ ANY[:, 1] > 0.98

@@ -83,14 +83,14 @@ def test_an_object_with_a_mesh_is_drawn_as_one_and_painted_points_above_it(scene
     count = len(view.paintable.points)
     bare = np.tile(BARE, (count, 1)).astype(np.uint8)
     view.set_colours(bare)
-    assert len(view.points.points) == 0
+    assert not view.points.visible
     painted = bare.copy()
     painted[:40] = (200, 30, 30)
     view.set_colours(painted)
     np.testing.assert_allclose(
         view.points.points, view.paintable.points[:40] * scene_view.units_per_m, atol=1e-6
     )
-    assert view.points.colors.shape == (40, 3)
+    assert view.points.colors.shape == (40, 3) and view.points.visible
 
 
 def test_meshes_of_regions_replace_the_earlier_ones(scene_view):
@@ -110,7 +110,7 @@ def test_a_scan_is_drawn_as_the_mesh_that_was_made_of_it(scene_view):
     assert len(view.points.points) == len(bare), "no mesh yet"
     view.draw_surface(with_mesh().mesh)
     view.set_colours(bare)
-    assert len(view.points.points) == 0
+    assert not view.points.visible
 
 
 def test_lines_lie_close_above_a_mesh(scene_view):

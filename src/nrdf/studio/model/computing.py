@@ -18,6 +18,7 @@ import numpy as np
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
 from nrdf.io.cloud import PointCloud
+from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.check import CheckedProcess, check_process
 from nrdf.process.model_choice import choose_model
 from nrdf.process.strategy import strategy_of
@@ -28,7 +29,12 @@ from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
 from nrdf.studio.model.paintable_cloud import PaintableCloud
 from nrdf.studio.model.placing import PlacedScan, Placement, place_scan
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of
-from nrdf.studio.model.uploads import read_sent, read_upload, shown_name
+from nrdf.studio.model.uploads import (
+    read_knowledge_zip,
+    read_sent,
+    read_upload,
+    shown_name,
+)
 from nrdf.studio.model.worker import Progress
 from nrdf.toolpath.tool_segments import contact_points
 
@@ -135,6 +141,11 @@ class LocalComputing:
         """`nrdf.studio.model.uploads.read_upload`."""
         progress(0, 1)
         return read_upload(name, content, category, unit)
+
+    def read_knowledge(self, name: str, content: bytes, progress: Progress) -> BoundKnowledge:
+        """`nrdf.studio.model.uploads.read_knowledge_zip`."""
+        progress(0, 1)
+        return read_knowledge_zip(name, content)
 
     def read_scan(
         self, name: str, content: bytes, model: str, reference: PointCloud, unit: str | None,

@@ -22,12 +22,14 @@ REFERENCE = "reference"
 @dataclass(frozen=True)
 class PaintedRegion:
     """A region of the reference: mask (n,) bool; colour: red, green, blue, 0 to 255; steps: what is
-    done to it, each as the mapping that a knowledge file holds, SI (it need not be right yet)."""
+    done to it, each as the mapping that a knowledge file holds, SI (it need not be right yet);
+    fill_holes: as a knowledge file has it."""
 
     name: str
     colour: tuple[int, int, int]
     mask: np.ndarray
     steps: tuple[Mapping[str, Any], ...] = ()
+    fill_holes: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Target:
 @dataclass(frozen=True)
 class Document:
     """Reference, regions with their processes, and targets; the model of a knowledge file, if it
-    is not the category's."""
+    is not the category's, whether its unusual category is meant, and its origin."""
 
     category: str = "chair"
     reference: LoadedObject | None = None
@@ -67,6 +69,8 @@ class Document:
     targets: tuple[Target, ...] = ()
     allow_overlap: bool = False
     model: str | None = None
+    allow_unusual: bool = False
+    origin: Mapping[str, Any] = field(default_factory=dict)
 
     def region(self, name: str) -> PaintedRegion | None:
         """The region of that name, or None."""

@@ -91,7 +91,14 @@ class Editor:
         regions = painted_regions_of(bound_knowledge, colours)
         self.session.change(
             Document(
-                knowledge.category, loaded, regions, (), knowledge.allow_overlap, knowledge.model
+                knowledge.category,
+                loaded,
+                regions,
+                (),
+                knowledge.allow_overlap,
+                knowledge.model,
+                knowledge.allow_unusual,
+                knowledge.origin,
             )
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.io.cloud import PointCloud
+from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer_result import TransferResult
@@ -64,6 +65,13 @@ class ResultCache:
             "read", name, content, category, unit, progress=progress
         )
         return cloud
+
+    def read_knowledge(self, name: str, content: bytes, progress: Progress) -> BoundKnowledge:
+        """The knowledge of a ZIP archive that a browser sent, as of `read_knowledge_zip`."""
+        bound: BoundKnowledge = self._computing.call(
+            "read_knowledge", name, content, progress=progress
+        )
+        return bound
 
     def read_scan(
         self, name: str, content: bytes, document: Document, unit: str | None, progress: Progress

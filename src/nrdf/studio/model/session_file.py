@@ -72,6 +72,8 @@ class _Tool(_Shown):
     name: str = "tool"
     radius_m: _Number = 0.0
     clearance_m: _Number = 0.0
+    body_length_m: _Number | None = None
+    body_radius_m: _Number | None = None
 
 
 class _Step(_Shown):
@@ -112,6 +114,7 @@ class _Region(StrictModel):
     colour: tuple[_Shade, _Shade, _Shade]
     indices: list[int]
     steps: list[_Step] = Field(min_length=1)
+    fill_holes: bool = False
 
 
 class _Target(_Object):
@@ -123,6 +126,8 @@ class _Content(StrictModel):
     category: str = Field(min_length=1, max_length=100)
     model: str | None = Field(default=None, min_length=1, max_length=100)
     allow_overlap: bool
+    allow_unusual: bool = False
+    origin: dict[str, Any] = Field(default={})
     reference: _Object | None
     regions: list[_Region]
     targets: list[_Target]
@@ -169,15 +174,18 @@ def read_document(folder: Path) -> Document:
     try:
         reference = _read_object(folder, content.reference)
         regions = tuple(
-            PaintedRegion(r.name, r.colour, _mask(r.indices, reference, r.name), _steps(r))
+            PaintedRegion(
+                r.name, r.colour, _mask(r.indices, reference, r.name), _steps(r), r.fill_holes
+            )
             for r in content.regions
         )
         targets = tuple(_read_target(folder, target) for target in content.targets)
     except NrdfError as error:
         raise ProcessError(f"{path} is damaged: {error}") from None
     return Document(
-        content.category, reference, regions, targets, content.allow_overlap, content.model
-    )
+        content.category, reference, regions, targets, content.allow_overlap, content.model,
+        content.allow_unusual, content.origin,
+    )  # fmt: skip
 
 
 def put_aside(folder: Path) -> Path:
@@ -262,6 +270,8 @@ def _plain(document: Document) -> dict[str, Any]:
         "category": document.category,
         "model": document.model,
         "allow_overlap": document.allow_overlap,
+        "allow_unusual": document.allow_unusual,
+        "origin": dict(document.origin),
         "reference": None if document.reference is None else loaded(document.reference),
         "regions": [
             {
@@ -269,6 +279,7 @@ def _plain(document: Document) -> dict[str, Any]:
                 "colour": region.colour,
                 "indices": np.flatnonzero(region.mask).tolist(),
                 "steps": list(region.steps),
+                "fill_holes": region.fill_holes,
             }
             for region in document.regions
         ],

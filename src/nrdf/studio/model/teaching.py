@@ -88,6 +88,8 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
         {
             "model": document.model,
             "allow_overlap": document.allow_overlap,
+            "allow_unusual": document.allow_unusual,
+            "origin": dict(document.origin),
             **_content(document.category, reference, drawn),
         },
         ORIGIN,
@@ -119,6 +121,7 @@ def _content(
             {
                 "name": region.name,
                 "indices": np.flatnonzero(region.mask).tolist(),
+                "fill_holes": region.fill_holes,
                 "processes": [dict(step) for step in region.steps],
             }
             for region in regions
@@ -135,7 +138,8 @@ def painted_regions_of(
         mask = np.zeros(len(bound_knowledge.cloud), bool)
         mask[bound_knowledge.regions[region.name]] = True
         steps = tuple(plain_step(process) for process in region.processes)
-        painted.append(PaintedRegion(region.name, colours[region.name], mask, steps))
+        colour = colours[region.name]
+        painted.append(PaintedRegion(region.name, colour, mask, steps, region.fill_holes))
     return tuple(painted)
 
 

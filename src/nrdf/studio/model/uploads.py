@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
+import zipfile
+import zlib
 from pathlib import Path, PurePath
 
 import numpy as np
 
 from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
-from nrdf.errors import CloudError, NrdfError
+from nrdf.errors import CloudError, NrdfError, ProcessError
 from nrdf.field.cloud_encoder import MINIMUM_POINTS, WORKING_POINTS
 from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
-from nrdf.process.bound_knowledge import known_unit
+from nrdf.io.file_names import safe_file_name
+from nrdf.process.bound_knowledge import BoundKnowledge, known_unit, read_bound_knowledge
 
 LARGEST_UPLOAD = 128 << 20
 ENDINGS = (
@@ -21,6 +25,7 @@ ENDINGS = (
 )  # fmt: skip
 BUNDLED = (REFERENCE, *TARGETS)
 _LONGEST_NAME = 60
+_MOST_FILES = 600
 
 
 def read_upload(name: str, content: bytes, category: str, unit: str | None = None) -> PointCloud:
@@ -51,6 +56,47 @@ def read_sent(name: str, content: bytes) -> PointCloud:
         except NrdfError as error:
             raise type(error)(str(error).replace(str(path), shown)) from None
     return cloud
+
+
+def read_knowledge_zip(name: str, content: bytes) -> BoundKnowledge:
+    """The knowledge of a ZIP archive that a browser sent: one knowledge file, and what it names.
+
+    Raises ProcessError for what is no such archive, holds folders within folders or too much, and
+    what `nrdf.process.bound_knowledge.read_bound_knowledge` raises.
+    """
+    shown = shown_name(name)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                _unpack(archive, Path(folder), shown)
+        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError):
+            raise ProcessError(
+                f"{shown} is no ZIP archive that can be read; give knowledge.zip of step 5, or one "
+                "made of a knowledge file and the files that it names"
+            ) from None
+        found = [path for path in Path(folder).iterdir() if path.suffix in (".yaml", ".yml")]
+        if len(found) != 1:
+            raise ProcessError(f"{shown} holds {len(found)} knowledge files (.yaml); give one")
+        try:
+            return read_bound_knowledge(found[0])
+        except NrdfError as error:
+            raise type(error)(str(error).replace(f"{folder}/", "")) from None
+
+
+def _unpack(archive: zipfile.ZipFile, folder: Path, shown: str) -> None:
+    """Write an archive's files, by the last part of their names, into a folder."""
+    members = [member for member in archive.infolist() if not member.is_dir()]
+    if len(members) > _MOST_FILES or sum(m.file_size for m in members) > LARGEST_UPLOAD:
+        raise ProcessError(
+            f"{shown} holds {len(members)} files; at most {_MOST_FILES} of together "
+            f"{LARGEST_UPLOAD >> 20} MiB are taken"
+        )
+    for member in members:
+        file = PurePath(member.filename.replace("\\", "/")).name
+        if safe_file_name(file, "") != file or (folder / file).exists():
+            raise ProcessError(f"{shown}: '{shown_name(file)}' is no name that is taken, or twice")
+        with archive.open(member) as sent:  # no more than its size says
+            (folder / file).write_bytes(sent.read(member.file_size))
 
 
 def check_upload(name: str, size: int) -> str:

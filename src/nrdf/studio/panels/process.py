@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -28,6 +29,17 @@ _LABELS = {
     "standoff_mm": ("Stand-off, mm", "standoff_mm: height above the surface; 0: contact"),
     "spindle_rpm": ("Spindle, rpm", "spindle_rpm; 0: none"),
 }
+_BODY = {
+    "body_length_m": (
+        "Tool body length, mm",
+        "body_length_mm: of the cylinder behind the tool centre point; places where it would touch "
+        "the object are warned of. 0: not checked.",
+    ),
+    "body_radius_m": ("Tool body radius, mm", "body_radius_mm; 0: that of the footprint"),
+}
+_AMOUNTS = ("thickness_um", "removal_um")
+_SHOWN = ("kind", "trajectory", "direction", "tool", *(si_name(name) for name in NUMBERS))
+_SHOWN_OF_TOOL = ("name", "radius_m", "clearance_m", *_BODY)
 _MAIN = ("stepover_mm", "spacing_mm"), ("force_n", "feed_mm_s", "tilt_deg")
 
 
@@ -55,6 +67,10 @@ class ProcessTab:
                 hint="Free space that the tool needs above the surface; points with less are left "
                 "out. 0: not checked.",
             )  # fmt: skip
+            self.body = {
+                name: gui.add_number(label, 0.0, step=1.0, hint=hint)
+                for name, (label, hint) in _BODY.items()
+            }
             self.step = gui.add_dropdown(
                 "Process step", ("1",), hint="Steps are run one after another on the region."
             )
@@ -67,6 +83,8 @@ class ProcessTab:
         inputs.on(self.tool.on_update, lambda _: self._set_tool())
         inputs.on(self.tool_radius.on_update, lambda _: self._set_tool())
         inputs.on(self.tool_clearance.on_update, lambda _: self._set_tool())
+        for handle in self.body.values():
+            inputs.on(handle.on_update, lambda _: self._set_tool())
         inputs.on(self.step.on_update, lambda event: self._select_step(event.value))
         inputs.on(self.steps.on_click, lambda event: self._change_steps(event.value))
 
@@ -89,6 +107,8 @@ class ProcessTab:
         inputs.set_value(self.tool, str(tool.get("name", "tool")))
         inputs.set_value(self.tool_radius, _millimetres(tool.get("radius_m", 0.0)))
         inputs.set_value(self.tool_clearance, _millimetres(tool.get("clearance_m", 0.0)))
+        for name, handle in self.body.items():
+            inputs.set_value(handle, _millimetres(tool.get(name) or 0.0))
         names = tuple(f"{i + 1}: {s.get('name', s['kind'])}" for i, s in enumerate(region.steps))
         inputs.set_options(self.step, names)
         inputs.set_value(self.step, names[context.step])
@@ -98,7 +118,7 @@ class ProcessTab:
             if direction is None
             else f"Lines run along ({', '.join(f'{x:.2f}' for x in direction)}): the arrow."
         )
-        self.status.content = self._plan(region)
+        self.status.content = "  \n".join([self._plan(region), *kept_as_it_is(step)])
 
     def _plan(self, region: PaintedRegion) -> str:
         """The metrics of the plan, in Markdown, or why there is none."""
@@ -154,6 +174,8 @@ class ProcessTab:
             "radius_m": self.tool_radius.value / 1e3,
             "clearance_m": self.tool_clearance.value / 1e3,
         }
+        tool |= {name: handle.value / 1e3 or None for name, handle in self.body.items()}
+        tool = {name: value for name, value in tool.items() if value is not None}
         self._change(tool=tool)
 
     def _select_step(self, shown: str) -> None:
@@ -175,6 +197,23 @@ class ProcessTab:
         self.context.draw()
         self.context.refresh_panel()
         self.context.plan()
+
+
+def kept_as_it_is(step: Mapping[str, Any]) -> list[str]:
+    """What a step has beyond the fields of the page, in Markdown; [] for nothing."""
+    more = {k: v for k, v in step.items() if k not in _SHOWN}
+    more |= {f"tool.{k}": v for k, v in step["tool"].items() if k not in _SHOWN_OF_TOOL}
+    said = [f"{name} **{amount_words(v)}**" for name, v in more.items() if name in _AMOUNTS]
+    rest = ", ".join(name for name in more if name not in _AMOUNTS)
+    lines = [f"The result that is wanted: {', '.join(said)}; feeds follow from it."] if said else []
+    return lines + ([f"Set as well, and kept as it is: {rest}."] if rest else [])
+
+
+def amount_words(amount: Any) -> str:
+    """An amount in µm as a file has it, such as "60 ± 10 µm"."""
+    if not isinstance(amount, Mapping):
+        return str(amount)
+    return f"{amount.get('value', 0):g} ± {amount.get('tolerance', 0):g} µm"
 
 
 def _labelled(fault: str) -> str:

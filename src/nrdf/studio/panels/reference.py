@@ -18,6 +18,7 @@ from nrdf.studio.panels.inputs import Inputs, PanelEvent
 
 if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
+    from nrdf.process.bound_knowledge import BoundKnowledge
 
 AS_IN_FILE = "as in the file"
 OTHER_KIND = "another kind …"
@@ -45,11 +46,16 @@ class ReferenceTab:
         self.upload = gui.add_upload_button(
             "Load a file …", mime_type=",".join(ENDINGS), hint=f"{', '.join(ENDINGS)}"
         )
+        self.knowledge = gui.add_upload_button(
+            "Open knowledge …", mime_type=".zip",
+            hint="knowledge.zip of step 5, or a ZIP of a knowledge file and what it names.",
+        )  # fmt: skip
         self.status = gui.add_markdown("")
         self.new = gui.add_button("New session", color="gray")
         inputs.on(self.category.on_update, lambda _: self._show_kind())
         inputs.on(self.open.on_click, lambda _: self._open())
         inputs.on(self.upload.on_upload, lambda event: self._load(event.value))
+        inputs.on(self.knowledge.on_upload, lambda event: self._load_knowledge(event.value))
         inputs.on(self.new.on_click, self._ask)
 
     def refresh(self) -> None:
@@ -85,6 +91,13 @@ class ReferenceTab:
             self.context.restore()
 
         self.context.read(file, category, unit_of(self.unit.value), opened)
+
+    def _load_knowledge(self, file: Any) -> None:
+        def opened(bound: BoundKnowledge) -> None:
+            self.context.editor.open_knowledge(bound.knowledge.reference.cloud or REFERENCE, bound)
+            self.context.restore()
+
+        self.context.read_knowledge(file, opened)
 
     def _show_kind(self) -> None:
         self.kind.visible = self.category.value == OTHER_KIND

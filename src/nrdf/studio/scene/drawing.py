@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from nrdf.reports.job_folder import panel_of
+from nrdf.reports.job_folder import lines_of_paths
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.placing import removed_points
@@ -90,7 +90,7 @@ def lines_of(
     colours = {r.name: _DEEP * np.array(r.colour) for r in editor.document.regions}
     if key != REFERENCE:
         result = results.by_target.get(key)
-        drawn = {} if result is None else panel_of(result.transfer_result, key).lines
+        drawn = {} if result is None else lines_of_paths(result.transfer_result)
         return {name: (parts, colours[name]) for name, parts in drawn.items() if name in colours}
     lines: dict[str, tuple[Sequence[np.ndarray], np.ndarray]] = {}
     for region in editor.document.regions:

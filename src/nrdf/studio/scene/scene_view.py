@@ -31,8 +31,7 @@ _LIFT = 1.4  # of lines above points, in spacings
 _ON_MESH = 0.0015  # of lines above a mesh, in sides of the object; regions lie half as high
 _LIGHT = np.array([0.62, 0.70, 0.35])
 """Direction to the light: front, above, right."""
-_REMOVED = (226, 140, 130)
-"""Colour of points that cleaning removed."""
+_REMOVED = (226, 140, 130)  # colour of points that cleaning removed
 _DARKEST = 0.58  # brightness of a point that faces away from the light
 
 
@@ -127,6 +126,9 @@ class ObjectView:
         shaded = (colours * shade[:, None]).astype(np.uint8)
         if self._mesh is not None:
             own = (colours != BARE.astype(np.uint8)).any(axis=1)
+            self.points.visible = bool(own.any())  # a browser takes no empty cloud
+            if not own.any():
+                return
             points = self.paintable.points[own] * self.scene_view.units_per_m
             self.points.points, shaded = points.astype(np.float32), shaded[own]
         self.points.colors = shaded
@@ -146,16 +148,14 @@ class ObjectView:
         """Draw points (k, 3), m, that cleaning removed, in place of earlier ones."""
         if self._removed is not None:
             self._removed.remove()
-        self._removed = None
+        factor, self._removed = self.scene_view.units_per_m, None
         if len(points):
-            factor = self.scene_view.units_per_m
             self._removed = self.scene_view.server.scene.add_point_cloud(
                 f"{self.path}/removed",
                 (points * factor).astype(np.float32),
                 np.full((len(points), 3), _REMOVED, np.uint8),
                 point_size=0.6 * _SIZE * self.paintable.surface.spacing * factor,
                 point_shape="circle",
-                precision="float32",
             )
 
     def draw_regions(self, regions: Mapping[str, tuple[Triangles, np.ndarray]]) -> None:
