@@ -17,10 +17,10 @@ import numpy as np
 from nrdf.errors import NrdfError
 from nrdf.process_model.cells import plate
 from nrdf.process_model.feed_planner import FeedLimits
-from nrdf.process_model.plan import constant_feeds, feeds_for, strategy_for
+from nrdf.process_model.plan import constant_feeds, plan_by_result
 from nrdf.process_model.plate_theory import best_stepover, variation
 from nrdf.process_model.result import ResultMetrics, Target
-from nrdf.process_model.result_model import ResultModel, cells_for
+from nrdf.process_model.result_model import ResultModel
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.mesh_edges import edge_components
 from nrdf.surface.region_mesh import RegionMesh
@@ -42,7 +42,7 @@ _CURVED_RAD = np.radians(5.0)  # standard deviation of the normals' angle from t
 @dataclass(frozen=True)
 class RegionResult:
     """One region. faces: of it as given; cells: that its film is computed on; curved: whether it
-    bends. seconds: CPU time of the film's matrix and the feeds. error: why there is none."""
+    bends. seconds: CPU time of all but the taught lines. error: why there is none."""
 
     target: str
     region: str
@@ -87,9 +87,11 @@ def evaluate_plate(radius_m: float = 0.05) -> PlateResult:
     region = RegionMesh.from_faces(mesh, np.ones(len(mesh.faces), bool))
     strategy = taught_strategy(Strategy(tool_radius_m=radius_m, spacing_m=0.01), profile)
     found = []
-    for lines, plan in ((strategy, constant_feeds), (strategy_for(strategy, profile), feeds_for)):
-        model = ResultModel.of(region, plan_on_mesh(region, lines), profile)
-        film = model.values(plan(model, TARGET, FeedLimits()))
+    lines = plan_on_mesh(region, strategy)
+    before = ResultModel.of(region, lines, profile)
+    planned = plan_by_result(region, lines, strategy, profile, TARGET, FeedLimits()).model
+    for model, feeds in ((before, constant_feeds(before, TARGET, FeedLimits())), (planned, None)):
+        film = model.values(feeds)
         inner = (np.abs(model.cells.centres[:, :2]) < 0.25 - radius_m).all(axis=1)
         share = model.cells.areas_m2[inner] / model.cells.areas_m2[inner].sum()
         mean = share @ film[inner]
@@ -130,17 +132,14 @@ def evaluate_region(region: RegionMesh, target: str, name: str, strategy: Strate
     faces, curved = len(region.mesh.faces), is_curved(region)
     taught = taught_strategy(strategy, profile)
     try:
-        before = ResultModel.of(region, plan_on_mesh(region, taught), profile)
-        plain = before.measure(TARGET, constant_feeds(before, TARGET, limits))
-        lines = plan_on_mesh(region, strategy_for(taught, profile))
+        lines = plan_on_mesh(region, taught)
         start = time.process_time()
-        model = ResultModel.of(region, lines, profile, cells_for(region, profile))
-        found = model.measure(TARGET, feeds_for(model, TARGET, limits))
+        made = plan_by_result(region, lines, taught, profile, TARGET, limits)
         seconds = time.process_time() - start
     except NrdfError as error:
         return RegionResult(target, name, faces, 0, curved, None, None, 0.0, str(error))
-    cells = len(model.cells.areas_m2)
-    return RegionResult(target, name, faces, cells, curved, found, plain, seconds)
+    cells = len(made.model.cells.areas_m2)
+    return RegionResult(target, name, faces, cells, curved, made.metrics, made.taught, seconds)
 
 
 def _sides(region: RegionMesh, name: str, whole: bool) -> Iterator[RegionMesh]:

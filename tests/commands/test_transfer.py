@@ -104,6 +104,77 @@ def test_a_mesh_is_judged_by_itself(taught, untrained, capsys):
     assert "the largest step between waypoints is" in said and "above 1 mm" in said
 
 
+_FILM = """
+        thickness_um: 60 ± 10
+        standoff_mm: 150
+        tool: {name: gun, radius_mm: 90, profile: {across_mm: 90, along_mm: 80, flow_mm3_s: 800}}"""
+_DEPTH = """
+        removal_um: 20 ± 8
+        force_n: 40
+        spindle_rpm: 9000
+        tool: {name: sander, radius_mm: 90, pad: {preston_per_pa: 5.0e-9, orbit_mm: 2.5}}"""
+
+
+def with_target(taught, kind, target):
+    """A knowledge file of the box's top with one process that has a target."""
+    (taught / "box.yaml").write_text(f"""version: 1
+category: chair
+reference: {{cloud: box.ply, unit: m}}
+regions:
+  - name: top
+    file: top.ply
+    processes:
+      - kind: {kind}{target}
+        trajectory: raster
+        stepover_mm: 60
+        feed_mm_s: 300
+""")
+
+
+@pytest.mark.parametrize(
+    ("kind", "target", "wanted", "least"),
+    [("paint", _FILM, "60 ± 10 µm", 0.85), ("sand", _DEPTH, "20 ± 8 µm", 0.5)],
+)
+def test_a_process_with_a_target_is_checked_planned_and_reported(
+    taught, untrained, capsys, kind, target, wanted, least
+):
+    with_target(taught, kind, target)
+    assert cli.run(["check", str(taught / "box.yaml")]) == 0
+    assert "nothing is wrong" in capsys.readouterr().out
+    new = cloud(seed=1)
+    (taught / "marked").mkdir()  # an untrained model's own region is ragged
+    write_cloud(taught / "marked" / "top.ply", new.select(faces(new)["top"]))
+    write_cloud(taught / "new.ply", new)
+    marked = ("--region", str(taught / "marked" / "top.ply"))
+    assert transfer(taught, untrained, *marked) == 0
+    (path,) = json.loads((taught / "job" / "report.json").read_text())["paths"]
+    result = path["result"]
+    assert result["planned"]["within"] >= max(least, result["taught"]["within"])
+    page = (taught / "job" / "report.html").read_text()
+    low, high = (f"{1e3 * result[f'feed_{end}_m_s']:.0f}" for end in ("least", "most"))
+    assert page.count(f"{low} to {high} mm/s") == 2 and "300 mm/s" not in page
+    assert wanted in page and "What they leave" in page and "worst places" in page
+    segments = [s for s in read_toolpaths(taught / "job").paths[0].segments if s.kind == "process"]
+    feeds = np.concatenate([s.feeds_m_s for s in segments])
+    assert feeds.min() == pytest.approx(result["feed_least_m_s"], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("across_mm: 90", "across_mm: 0", "tool.profile.across_m: must be above 0.0, not 0.0"),
+        ("across_mm: 90", "across_m: 50", "across_m is 50 (50000 mm), above what is plausible"),
+        ("60 ± 10", "6000 ± 10", "µm at most and"),
+        ("60 ± 10", "60e-6", "no amount with a tolerance; write it as 60 ± 10"),
+        ("thickness_um", "thickness_mm", "did you mean 'thickness_um'?"),
+    ],
+)
+def test_a_target_that_cannot_be_is_answered(taught, capsys, old, new, said):
+    with_target(taught, "paint", _FILM.replace(old, new))
+    assert cli.run(["check", str(taught / "box.yaml")]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
 def test_scan_options_need_up(taught, untrained, capsys):
     assert transfer(taught, untrained, "--skip", "floor") == 2
     assert "--sensor and --skip are for scans: give --up" in capsys.readouterr().err

@@ -10,10 +10,11 @@ import pytest
 from nrdf.errors import ProcessError
 from nrdf.process_model.cells import plate
 from nrdf.process_model.feed_planner import FeedLimits
-from nrdf.process_model.plan import plan_by_result, strategy_for
+from nrdf.process_model.plan import feeds_for, plan_by_result, strategies_for
 from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import Target
+from nrdf.process_model.result_model import ResultModel
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -64,11 +65,37 @@ def test_a_pad_that_does_not_turn_has_no_target(region):
         plan_by_result(region, (), TAUGHT, still, TARGET, FeedLimits())
 
 
-def test_lines_are_as_theory_has_them_but_no_farther_apart_than_taught():
-    made = strategy_for(TAUGHT, GUN)
-    assert made.stepover_m == pytest.approx(min(best_stepover(GUN), 0.03))
-    assert made.run_off_m == pytest.approx(0.5 * 0.05)
+def test_lines_are_as_theory_has_them_farther_apart_or_as_taught():
+    tried = strategies_for(TAUGHT, GUN)
+    even = best_stepover(GUN)
+    assert [one.stepover_m for one in tried] == pytest.approx([1.5 * even, even, 0.03])
+    assert {one.run_off_m for one in tried} == {0.5 * 0.05}
+    assert len(strategies_for(replace(TAUGHT, stepover_m=1.02 * even), GUN)) == 2
     pad = Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
-    assert strategy_for(TAUGHT, pad).run_off_m == TAUGHT.run_off_m
+    assert strategies_for(TAUGHT, pad)[0].run_off_m == TAUGHT.run_off_m
     joined = replace(TAUGHT, line_order="zigzag", join_gap_m=0.1)
-    assert strategy_for(joined, pad).joined_gap_m == 0.0
+    assert strategies_for(joined, pad)[0].joined_gap_m == 0.0
+
+
+def test_lines_are_chosen_by_what_they_leave(region):
+    """Neither the first that is tried nor the last where another one is better."""
+    taught, limits = plan_on_mesh(region, TAUGHT), FeedLimits(acceleration_m_s2=0.2)
+    within = {}
+    for own in strategies_for(TAUGHT, GUN):
+        model = ResultModel.of(region, plan_on_mesh(region, own), GUN)
+        within[own.stepover_m] = model.measure(TARGET, feeds_for(model, TARGET, limits)).within
+    made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, limits)
+    assert made.strategy.stepover_m == max(within, key=within.__getitem__)
+    assert made.metrics.within == pytest.approx(max(within.values()))
+
+
+def test_what_is_taught_is_never_made_worse():
+    """Even by theory, lines of this pad are so near each other that no feed is fast enough."""
+    pad = Pad(0.025, 2e7, 5e-9, 20.0, 942.0, 0.0025)
+    coarse = replace(TAUGHT, stepover_m=0.02, tool_radius_m=0.025, standoff_m=0.0, run_off_m=0.0)
+    mesh = plate(0.3, 0.3, 0.02)
+    flat = RegionMesh.from_faces(mesh, np.ones(len(mesh.faces), bool))
+    target, limits = Target(20e-6, 5e-6), FeedLimits(most_m_s=0.7)
+    made = plan_by_result(flat, plan_on_mesh(flat, coarse), coarse, pad, target, limits)
+    assert made.strategy.stepover_m > best_stepover(pad)
+    assert made.metrics.within >= made.taught.within > 0.5

@@ -50,6 +50,27 @@ def test_a_pad_takes_off_and_wastes_nothing():
     assert model.measure(Target(60e-6, 6e-6)).overspray == 0.0
 
 
+def test_a_pad_presses_nothing_where_it_runs_off_but_a_gun_sprays_there():
+    """The whole pad's force would otherwise lie on the part of it that is over the edge."""
+    pad = Pad(0.04, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
+    line = passes([-0.1], 0.3, 0.0)[0]
+    off = np.abs(line.positions[:, 1]) > 0.13
+    over = replace(line, on_surface=~off, dwell_s=1.0)
+    assert off[-1] and not off.all()
+    short = replace(
+        line, positions=line.positions[~off], quaternions_xyzw=line.quaternions_xyzw[~off]
+    )
+    pressed = ResultModel.of(half_a_plate(), [over], pad)
+    assert pressed.values() == pytest.approx(
+        ResultModel.of(half_a_plate(), [short], pad).values(), rel=1e-9
+    )
+    gun, sprayed = (
+        ResultModel.of(half_a_plate(), [one], GUN).values()
+        for one in (replace(line, dwell_s=1.0), over)
+    )
+    assert sprayed == pytest.approx(gun)
+
+
 def test_segments_take_the_feeds_of_their_moves():
     segments = passes([-0.1, -0.05], 0.02)
     model = ResultModel.of(half_a_plate(), segments, GUN)

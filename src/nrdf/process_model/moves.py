@@ -26,22 +26,32 @@ class ToolSamples:
     weights: np.ndarray
     column: np.ndarray
 
+    def select(self, chosen: np.ndarray) -> ToolSamples:
+        """Those of a mask (k,); columns keep their numbers."""
+        return ToolSamples(
+            self.places[chosen], self.axes[chosen], self.along[chosen], self.weights[chosen],
+            self.column[chosen],
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Moves:
     """All moves between neighbouring waypoints of process segments, and stops at their ends.
 
     lengths_m, feeds_m_s: (m,). segment: (m,), which of the segments. turns_rad: (m,), by how far
-    the way turns from a move to the next one of its segment; 0 for the last. samples: of the moves;
-    stops: of dwells, one for each segment that has one.
+    the way turns from a move to the next one of its segment; 0 for the last. pressed: (m,), false
+    where a pad is beyond the edge, at either end of a move, and is only held there. samples: of the
+    moves; stops: of dwells, one for each segment that has one; stops_pressed: as of moves.
     """
 
     lengths_m: np.ndarray
     feeds_m_s: np.ndarray
     segment: np.ndarray
     turns_rad: np.ndarray
+    pressed: np.ndarray
     samples: ToolSamples
     stops: ToolSamples
+    stops_pressed: np.ndarray
 
     @staticmethod
     def of(segments: Sequence[Segment], step_m: float) -> Moves:
@@ -52,7 +62,7 @@ class Moves:
         work = [segment for segment in segments if segment.kind == "process"]
         if not work:
             raise ProcessError("a tool path without a process segment works nothing")
-        lengths, feeds, owner, turns = [], [], [], []
+        lengths, feeds, owner, turns, over, stops_over = [], [], [], [], [], []
         parts: list[ToolSamples] = []
         stops: list[ToolSamples] = []
         count = 0
@@ -62,13 +72,17 @@ class Moves:
             feeds.append(segment.speeds_m_s[1:])
             owner.append(np.full(len(step), number))
             turns.append(_turns(segment.positions))
+            there = segment.over_surface
+            over.append(there[:-1] & there[1:])
             parts.append(_sampled(segment, step, step_m, count))
             count += len(step)
             if segment.dwell_s > 0.0:
                 stops.append(_stop(segment, len(stops)))
+                stops_over.append(bool(there[-1]))
         return Moves(
             np.concatenate(lengths), np.concatenate(feeds), np.concatenate(owner),
-            np.concatenate(turns), _together(parts), _together(stops),
+            np.concatenate(turns), np.concatenate(over), _together(parts), _together(stops),
+            np.array(stops_over, bool),
         )  # fmt: skip
 
     @property

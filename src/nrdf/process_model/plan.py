@@ -1,6 +1,7 @@
 """Planning by the result: lines, run-off and feeds with which a region gets what it should have.
 
-The taught plan, at one feed, stands beside it: both are measured in the same way.
+A few stepovers are tried, and the one with the most area within the tolerance is taken. The taught
+plan, at one feed, stands beside it: both are measured in the same way.
 """
 
 from __future__ import annotations
@@ -28,6 +29,11 @@ from nrdf.toolpath.strategy import LineOrder, Strategy
 from nrdf.toolpath.types import Segment
 
 _RUN_OFF = 0.5  # half-widths along the travel: slower ends do the rest
+_STEPOVERS = (1.5, 1.0)
+"""Times the stepover of theory that are tried. Lines farther apart are driven slower, which
+leaves the arm more time to change its speed; finer ones are more even."""
+_SAME = 0.1  # stepovers that are no farther from each other are one
+_GOOD = 0.98  # share within the tolerance with which no other lines are tried
 
 
 @dataclass(frozen=True)
@@ -62,16 +68,45 @@ def plan_by_result(
     check_reachable_at_all(tool)
     cells = cells_for(region, tool)
     before = ResultModel.of(region, taught, tool, cells)
-    plain = before.measure(target, constant_feeds(before, target, limits))
-    lines = tuple(taught)
-    if replan:
-        strategy = strategy_for(strategy, tool)
-        lines = plan_on_mesh(region, strategy)
-    model = ResultModel.of(region, lines, tool, cells) if replan else before
-    feeds = feeds_for(model, target, limits)
+    plain_feeds = constant_feeds(before, target, limits)
+    plain = before.measure(target, plain_feeds)
+
+    def planned(lines: Sequence[Segment], own: Strategy, model: ResultModel) -> PlannedResult:
+        return _driven(lines, own, model, feeds_for(model, target, limits), target, plain)
+
+    if not replan:
+        return planned(taught, strategy, before)
+    best, fault = None, None
+    for own in strategies_for(strategy, tool):
+        lines = plan_on_mesh(region, own)
+        try:
+            made = planned(lines, own, ResultModel.of(region, lines, tool, cells))
+        except ProcessError as error:  # other lines may have it in reach
+            fault = error
+            continue
+        best = made if best is None or made.metrics.within > best.metrics.within else best
+        if best.metrics.within >= _GOOD:
+            return best
+    if best is None:
+        assert fault is not None
+        raise fault
+    if plain.within > best.metrics.within:  # what is taught is never made worse
+        best = _driven(taught, strategy, before, plain_feeds, target, plain)
+    return best
+
+
+def _driven(
+    lines: Sequence[Segment],
+    strategy: Strategy,
+    model: ResultModel,
+    feeds: np.ndarray,
+    target: Target,
+    taught: ResultMetrics,
+) -> PlannedResult:
+    """Lines driven at feeds (m,) of their moves."""
     segments = with_feeds(lines, model.moves, feeds)
     model = replace(model, moves=replace(model.moves, feeds_m_s=feeds))
-    return PlannedResult(segments, strategy, model, model.measure(target), plain)
+    return PlannedResult(segments, strategy, model, model.measure(target), taught)
 
 
 def feeds_for(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
@@ -96,9 +131,9 @@ def constant_feeds(model: ResultModel, target: Target, limits: FeedLimits) -> np
     return within_acceleration(feeds, model.moves, limits)
 
 
-def strategy_for(strategy: Strategy, tool: Tool) -> Strategy:
-    """The lines for a tool: as far apart as theory has them even, on a plate; a gun's run off by a
-    part of its half-width. What is taught finer stays.
+def strategies_for(strategy: Strategy, tool: Tool) -> list[Strategy]:
+    """Lines for a tool that are worth a try, the likeliest first: as far apart as theory has them
+    even on a plate, farther, and as taught; a gun's run off by a part of its half-width.
 
     The tool lifts between lines: where it turns without lifting it must slow down, and leaves too
     much at every reversal.
@@ -107,10 +142,14 @@ def strategy_for(strategy: Strategy, tool: Tool) -> Strategy:
     if isinstance(tool, SprayProfile):
         run_off = _RUN_OFF * tool.ends_m[1]
     order: LineOrder = "one-way" if strategy.line_order == "one-way" else "snake"
-    return replace(
-        strategy, stepover_m=min(strategy.stepover_m, best_stepover(tool)), run_off_m=run_off,
-        line_order=order, join_gap_m=0.0, constant_speed=False,
-    )  # fmt: skip
+    lines = replace(
+        strategy, run_off_m=run_off, line_order=order, join_gap_m=0.0, constant_speed=False
+    )
+    even = best_stepover(tool)
+    tried = [times * even for times in _STEPOVERS]
+    if not any(abs(strategy.stepover_m / stepover - 1.0) < _SAME for stepover in tried):
+        tried.append(strategy.stepover_m)
+    return [replace(lines, stepover_m=stepover) for stepover in tried]
 
 
 def check_reachable_at_all(tool: Tool) -> None:

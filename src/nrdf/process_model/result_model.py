@@ -53,9 +53,10 @@ class ResultModel:
             dwells = deposition(cells, moves.stops, stops, tool, blocking)
             flow = tool.flow_m3_s
         else:
-            feeds = moves.feeds_m_s[moves.samples.column]
-            matrix = removal(cells, moves.samples, count, tool, feeds)
-            dwells = removal(cells, moves.stops, stops, tool, 0.0)
+            # Beyond an edge a pad is held where it was planned, and presses nothing.
+            samples = moves.samples.select(moves.pressed[moves.samples.column])
+            matrix = removal(cells, samples, count, tool, moves.feeds_m_s[samples.column])
+            dwells = removal(cells, moves.stops.select(moves.stops_pressed), stops, tool, 0.0)
             flow = 0.0
         fixed = np.asarray(dwells.sum(axis=1)).ravel()
         return ResultModel(cells, moves, matrix, fixed, flow)

@@ -14,7 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from nrdf.geometry.units import readable
 from nrdf.io.atomic import write_atomically
-from nrdf.reports.result_report import histogram, result_lines
+from nrdf.reports.result_report import feed_in_words, histogram, result_lines
 from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
 from nrdf.viz.heat_map import HeatMap
 from nrdf.viz.palette import region_colours
@@ -182,7 +182,7 @@ def _properties(path: Mapping[str, Any], region: Mapping[str, Any]) -> list[tupl
         ("tool, radius", f"{tool['name']}, {readable('radius_m', tool['radius_m'])}"),
         ("lead, tilt, stand-off",
          f"{quantity('lead_rad')}, {quantity('tilt_rad')}, {quantity('standoff_m')}"),
-        ("force, feed", f"{quantity('force_n')}, {quantity('feed_m_s')}"),
+        ("force, feed", f"{quantity('force_n')}, {feed_in_words(path, quantity('feed_m_s'))}"),
         ("left out of the region", left_out_in_words(metrics["left_out"])),
     ]  # fmt: skip
     if region["area_m2"] is not None:

@@ -53,14 +53,22 @@ def result_lines(content: Mapping[str, Any]) -> list[tuple[str, str]]:
          f"{1e6 * planned['most_m']:.3g} µm"),
         ("variation, planned · at one feed",
          f"{planned['variation']:.1%} · {taught['variation']:.1%}"),
-        ("feeds",
-         f"{1e3 * content['feed_least_m_s']:.0f} to {1e3 * content['feed_most_m_s']:.0f} mm/s"),
+        ("feeds", _feeds(content)),
     ]  # fmt: skip
     if content["what"] == "film":
         both = f"{planned['overspray']:.1%} · {taught['overspray']:.1%}"
         lines.append(("overspray, planned · at one feed", both))
     worst = [f"{place['where']}: {1e6 * place['value_m']:.3g} µm" for place in content["worst"]]
     return [*lines, ("worst places", "; ".join(worst) or "none beyond the tolerance")]
+
+
+def feed_in_words(path: Mapping[str, Any], taught: str) -> str:
+    """The feeds of a path, as its report has them: `taught`, unless its result has others."""
+    return _feeds(path["result"]) if path.get("result") else taught
+
+
+def _feeds(content: Mapping[str, Any]) -> str:
+    return f"{1e3 * content['feed_least_m_s']:.0f} to {1e3 * content['feed_most_m_s']:.0f} mm/s"
 
 
 def result_heat_maps(result: TransferResult) -> list[HeatMap | None]:
