@@ -18,7 +18,8 @@ from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.types import Segment
 
 _UM = 1e-6
-_LEAST_WITHIN = 0.95  # share of the area, below which there is a warning
+LEAST_WITHIN = 0.95
+"""Share of the area within the tolerance, below which there is a warning."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def result_warnings(process: Process, planned: PlannedResult | None) -> list[str
     if planned is None or settings is None:
         return []
     metrics, target, lines = planned.metrics, settings.target, []
-    if metrics.within < _LEAST_WITHIN:
+    if metrics.within < LEAST_WITHIN:
         wanted = f"{1e6 * target.value_m:.4g} ± {1e6 * target.tolerance_m:.4g} µm"
         lines.append(
             f"{metrics.within:.1%} of the region will have {wanted}; {metrics.below:.1%} less, "

@@ -12,6 +12,9 @@ from nrdf.surface.target_mesh import TargetMesh
 
 _SAME = 1e-6  # of the object's size: how near a face's centre lies to the region that it is of
 _PARALLEL = 0.9  # cosine
+_OFF, _TIMES = 0.99, 2.0
+"""Share of a region's cells, and times their largest distance from its object, within which other
+faces are its own: where it was cut from another mesh of the object."""
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,23 @@ class Cells:
     @staticmethod
     def of(region: RegionMesh, edge_m: float, around_m: float) -> Cells:
         """Cells with edges of at most `edge_m`, of a region and of the object's other faces within
-        `around_m` of it."""
+        `around_m` of it.
+
+        Where the region was cut from another mesh of the object than its parent, its cells lie on
+        the parent: behind it they would be in its shadow.
+        """
         own = refine(region.mesh.vertices, region.mesh.faces, edge_m)
-        parts = [(own.centres, own.normals, own.areas, True)]
-        beside = _beside(region, edge_m, around_m)
+        centres, normals = own.centres, own.normals
+        same = _SAME * region.parent.size
+        there = region.parent.nearest(centres, normals)
+        off = float(np.quantile(there.distances, _OFF))
+        if off > same:
+            same = _TIMES * off
+            near = (there.distances < same)[:, None]
+            centres = np.where(near, there.points, centres)
+            normals = np.where(near, there.normals, normals)
+        parts = [(centres, normals, own.areas, True)]
+        beside = _beside(region, edge_m, around_m, same)
         if beside is not None:
             parts.append((*beside, False))
         return Cells(
@@ -51,9 +67,10 @@ class Cells:
 
 
 def _beside(
-    region: RegionMesh, edge_m: float, around_m: float
+    region: RegionMesh, edge_m: float, around_m: float, same_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Centres, normals and areas of what lies around a region; None where nothing does."""
+    """Centres, normals and areas of what lies around a region, farther from it than `same_m` or
+    turned another way; None where nothing does."""
     parent = region.parent
     corners = parent.vertices[parent.faces]
     low, high = region.mesh.vertices.min(axis=0), region.mesh.vertices.max(axis=0)
@@ -65,7 +82,7 @@ def _beside(
     fine = refine(part.vertices, part.faces, edge_m)
     found = region.mesh.nearest(fine.centres, fine.normals)
     facing = np.einsum("na,na->n", found.normals, fine.normals)
-    same = (found.distances < _SAME * parent.size) & (facing > _PARALLEL)
+    same = (found.distances < same_m) & (facing > _PARALLEL)
     kept = ~same & (found.distances < around_m)
     if not kept.any():
         return None

@@ -55,12 +55,18 @@ class Pad:
 
 
 def removal(
-    cells: Cells, samples: ToolSamples, columns: int, pad: Pad, feed_m_s: np.ndarray | float
+    cells: Cells,
+    samples: ToolSamples,
+    columns: int,
+    pad: Pad,
+    feed_m_s: np.ndarray | float,
+    force_n: np.ndarray | None = None,
 ) -> csr_matrix:
     """Depth of each cell for each move: a matrix (n, columns).
 
     For moves its unit is m², depth (m) for each slowness (s/m); for stops m, the depth itself.
     feed_m_s: of the samples (k,) or of all, 0 for stops: it adds to the speed of the abrasive.
+    force_n: of the samples (k,), the pad's own unless given.
     """
     shape = (len(cells.centres), columns)
     if not len(samples.places):
@@ -83,7 +89,8 @@ def removal(
     cell, sample, gap, flat = cell[under], sample[under], gap[under], flat[under]
     off_centre, carried, share = off_centre[under], carried[under], share[under]
     area = share * carried * cells.areas_m2[cell]
-    pressure = winkler_pressure(sample, gap, area, pad.force_n, pad.stiffness_n_m3)
+    force = np.full(len(samples.places), pad.force_n) if force_n is None else force_n
+    pressure = winkler_pressure(sample, gap, area, force[sample], pad.stiffness_n_m3)
     feeds = np.broadcast_to(np.asarray(feed_m_s, float), (len(samples.places),))[sample]
     turned = np.cross(samples.axes[sample], flat)
     ahead = np.einsum("ka,ka->k", turned, samples.along[sample])
@@ -110,27 +117,33 @@ def sliding_speed(
 
 
 def winkler_pressure(
-    sample: np.ndarray, gap_m: np.ndarray, area_m2: np.ndarray, force_n: float, stiffness: float
+    sample: np.ndarray,
+    gap_m: np.ndarray,
+    area_m2: np.ndarray,
+    force_n: np.ndarray | float,
+    stiffness: float,
 ) -> np.ndarray:
     """Pressure (k,), Pa, under a pad at each sample.
 
     sample: (k,) which; gap_m: (k,) how far along the pad's axis a cell lies from its plane;
-    area_m2: (k,) of the cell, square to the axis. The pad sinks until all carry `force_n`.
+    area_m2: (k,) of the cell, square to the axis. The pad sinks until all carry `force_n`, one
+    for all or (k,) that of each one's sample.
     """
     if not len(sample):
         return np.zeros(0)
     order = np.lexsort((gap_m, sample))
     group, gap, area = sample[order], gap_m[order], area_m2[order]
+    force = np.broadcast_to(np.asarray(force_n, float), (len(sample),))[order]
     start = np.flatnonzero(np.concatenate([[True], group[1:] != group[:-1]]))
     count = np.diff(np.append(start, len(group)))
     number = np.repeat(np.arange(len(start)), count)
     # Within a group gaps count from its first: sums of large numbers would lose digits.
     rise = gap - np.repeat(gap[start], count)
     before, lost = (_sums_before(values, start, count) for values in (area, area * rise))
-    touched = stiffness * (rise * before - lost) < force_n
+    touched = stiffness * (rise * before - lost) < force
     wide = np.bincount(number, area * touched, len(start))
     moment = np.bincount(number, area * rise * touched, len(start))
-    depth = (force_n / stiffness + moment) / np.maximum(wide, 1e-300)
+    depth = (force[start] / stiffness + moment) / np.maximum(wide, 1e-300)
     pressure = np.zeros(len(group))
     pressure[order] = stiffness * np.maximum(depth[number] - rise, 0.0) * touched
     return pressure

@@ -113,19 +113,22 @@ def _results(
     """Of each path with a target: its name, lines, picture and histogram."""
     made = []
     for path, drawn in zip(report["paths"], heat_maps, strict=False):
-        content = path.get("result")
-        if content is None or drawn is None:
-            continue
-        bars = histogram(drawn.shares, content["target_m"], content["tolerance_m"])
-        made.append(
-            {
-                "name": f"{path['region']}: {path['process']}",
-                "lines": result_lines(content),
-                "picture": _png_source(drawn.image),
-                "bars": bars,
-            }
-        )
+        if path.get("result") is not None and drawn is not None:
+            made.append(result_block(path, result_lines(path["result"]), drawn))
     return made
+
+
+def result_block(
+    path: Mapping[str, Any], lines: Sequence[tuple[str, str]], drawn: HeatMap
+) -> dict[str, Any]:
+    """What the template's `results` shows of a path: its lines beside picture and histogram."""
+    content = path["result"]
+    return {
+        "name": f"{path['region']}: {path['process']}",
+        "lines": lines,
+        "picture": _png_source(drawn.image),
+        "bars": histogram(drawn.shares, content["target_m"], content["tolerance_m"]),
+    }
 
 
 def _header(report: Mapping[str, Any]) -> list[str]:

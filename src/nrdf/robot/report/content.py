@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from nrdf.process.result_target import LEAST_WITHIN
+from nrdf.reports.result_report import executed_content, executed_lines
 from nrdf.robot.model.tool import PAD_GIVE_M
 from nrdf.robot.planning.timing import STEP_S
 from nrdf.robot.simulation.job import SimulationJob
 from nrdf.robot.simulation.metrics import FORCE_BAND, VERDICTS
 from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
 from nrdf.toolpath.cycle_time import estimate_cycle_time
+from nrdf.viz.heat_map import HeatMap, heat_map
 
 COLUMNS = (
     "reached", "region worked · planned", "left out · unreached", "force", "within ±20 %",
@@ -41,7 +44,7 @@ NOTES = (
 def simulation_report(result: SimulationResult) -> dict[str, Any]:
     """Everything that report.json says of a simulation; SI."""
     job = result.simulation_job
-    paths = [_path(path, _planned_seconds(path, job)) for path in result.paths]
+    paths = [_path(path, _planned_seconds(path, job), job.upright) for path in result.paths]
     reached = sum(p["reached"] for p in paths)
     waypoints = sum(p["waypoints"] for p in paths)
     pressed = [p for p in paths if p["force"] is not None]
@@ -103,7 +106,36 @@ def _planned_seconds(simulated: SimulatedPath, job: SimulationJob) -> float:
     return estimate_cycle_time(path.segments, surface, path.tool_radius_m, up).total_s
 
 
-def _path(simulated: SimulatedPath, planned_s: float) -> dict[str, Any]:
+def executed_heat_maps(result: SimulationResult) -> list[HeatMap | None]:
+    """A picture of what each path left, on the true mesh; None for those without a target."""
+    job = result.simulation_job
+    turn = canonical_axes(job.upright)
+    drawn: list[HeatMap | None] = []
+    for path in result.paths:
+        left = path.result
+        if left is None:
+            drawn.append(None)
+            continue
+        values, target = left.cells.of_region(left.values_m), left.settings.target
+        drawn.append(
+            heat_map(
+                job.surfaces.given,
+                left.cells.fine,
+                values,
+                target.value_m,
+                target.tolerance_m,
+                turn,
+            )
+        )
+    return drawn
+
+
+def canonical_axes(upright: np.ndarray) -> np.ndarray:
+    """From rows ahead, left, up (3, 3) to columns that are canonical: +X ahead, +Y up, +Z right."""
+    return np.stack([upright[0], upright[2], -upright[1]], axis=1)
+
+
+def _path(simulated: SimulatedPath, planned_s: float, upright: np.ndarray) -> dict[str, Any]:
     metrics, path = simulated.metrics, simulated.path
     force = None
     if metrics.force_commanded_n is not None and metrics.force_mean_n is not None:
@@ -121,10 +153,17 @@ def _path(simulated: SimulatedPath, planned_s: float) -> dict[str, Any]:
         for group, verdict in zip(path.groups, metrics.verdicts, strict=True)
         for k in np.flatnonzero(verdict != "reached")
     ]
+    left, result = simulated.result, None
+    if left is not None:
+        result = executed_content(
+            left.settings, "film" if left.process.thickness_um else "depth", left.cells,
+            left.values_m, left.metrics, left.planned, upright,
+        )  # fmt: skip
     return {
         "region": path.region,
         "process": path.process,
         "tool": path.tool,
+        "result": result,
         "lines": len(path.groups),
         "joint_paths": metrics.joint_paths,
         "waypoints": metrics.waypoints,
@@ -192,12 +231,26 @@ def _warnings(paths: list[dict[str, Any]]) -> list[str]:
                 f"planned one, by {np.degrees(path['max_tilt_rad']):.0f}° at most, as something "
                 "is in its way"
             )
+        lines += [f"{name}: {line}" for line in _result_warnings(path)]
         if path["slower_than_feed_share"] > 0.1:
             lines.append(
                 f"{name}: at {path['slower_than_feed_share']:.0%} of the waypoints the joints "
                 "are too slow for the whole feed"
             )
     return lines
+
+
+def _result_warnings(path: Mapping[str, Any]) -> list[str]:
+    """What a person should look at of the film or depth that the arm left."""
+    content = path["result"]
+    if content is None or content["executed"]["within"] >= LEAST_WITHIN:
+        return []
+    done, planned = content["executed"], content["planned"]
+    wanted = dict(executed_lines(content))[f"{content['what']} wanted"]
+    return [
+        f"{done['within']:.1%} of the region has {wanted} (planned: {planned['within']:.1%}); "
+        f"{done['below']:.1%} less, {done['above']:.1%} more"
+    ]
 
 
 def metrics_row(path: Mapping[str, Any]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from nrdf.io.atomic import write_json
 from nrdf.io.result_folder import REPORT
-from nrdf.robot.report.content import simulation_report
+from nrdf.robot.report.content import executed_heat_maps, simulation_report
 from nrdf.robot.report.html_report import write_html_report
 from nrdf.robot.report.pictures import draw_pictures
 from nrdf.robot.report.trajectories import write_bag, write_csv, write_script
@@ -42,7 +42,7 @@ def write_simulation(
     if pictures:
         missing = draw_pictures(folder, result, film, progress)
         report["warnings"] += [missing] if missing else []
-    write_html_report(folder, report)
+    write_html_report(folder, report, executed_heat_maps(result))
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     report["files"] = [*files, REPORT]
     write_json(folder / REPORT, report)

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from nrdf.reports.html import duration_in_words, image_source, write_html
+from nrdf.reports.html import duration_in_words, image_source, result_block, write_html
+from nrdf.reports.result_report import executed_lines
 from nrdf.robot.report.content import COLUMNS, metrics_row
 from nrdf.robot.report.pictures import COVERAGE, FILM, STILL
+from nrdf.viz.heat_map import HeatMap
 
 
-def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
-    """Write report.html beside the pictures that it shows. Raises OutputError."""
+def write_html_report(
+    folder: Path, report: Mapping[str, Any], heat_maps: Sequence[HeatMap | None] = ()
+) -> None:
+    """Write report.html beside the pictures that it shows. Raises OutputError.
+
+    heat_maps: one a path, of what it left; None for those without a target.
+    """
     content = {
         "report": report,
         "header": _header(report),
@@ -24,6 +31,11 @@ def write_html_report(folder: Path, report: Mapping[str, Any]) -> None:
         "still": image_source(folder / STILL),
         "film": image_source(folder / FILM),
         "coverage": image_source(folder / COVERAGE),
+        "results": [
+            result_block(path, executed_lines(path["result"]), drawn)
+            for path, drawn in zip(report["paths"], heat_maps, strict=False)
+            if drawn is not None
+        ],
         "not_reached": _not_reached(report),
         "made": _how_it_was_made(report),
     }

@@ -12,6 +12,7 @@ from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.similarity import up_axis
 from nrdf.io.formats.mesh_file import load_mesh
 from nrdf.process.bound_knowledge import BoundKnowledge, read_bound_knowledge
+from nrdf.process.process import Process
 from nrdf.reports.job_folder import KNOWLEDGE
 from nrdf.robot.model.cell import upright_rotation
 from nrdf.robot.simulation.job_surface import JobSurfaces, read_job_surfaces
@@ -52,6 +53,15 @@ class SimulationJob:
         normals = self.bound_knowledge.cloud.normals
         assert normals is not None  # read_simulation_job lets no other pass
         return normals
+
+    def process_of(self, path: ToolPath) -> Process | None:
+        """The process that made a tool path, as the job's knowledge has it; None where it has none
+        of that label."""
+        for region in self.bound_knowledge.knowledge.regions:
+            for process in region.steps if region.name == path.region else []:
+                if process.label == path.process:
+                    return process
+        return None
 
     def with_mesh(self, file: str | Path) -> SimulationJob:
         """The same with the mesh of a file, in metres, as the object that the arm meets.

@@ -24,6 +24,7 @@ from nrdf.robot.planning.program import PathProgram, find_home
 from nrdf.robot.simulation.collision import Collision
 from nrdf.robot.simulation.collision_rejection import run
 from nrdf.robot.simulation.execute import ExecutionLog
+from nrdf.robot.simulation.executed_result import ExecutedResult, executed_result
 from nrdf.robot.simulation.job import SimulationJob
 from nrdf.robot.simulation.metrics import PathMetrics, measure_path
 from nrdf.toolpath.strategy import Strategy
@@ -34,7 +35,8 @@ LIBRARY_SIZE = 40_000
 
 @dataclass(frozen=True)
 class SimulatedPath:
-    """One tool path on the arm. collisions, rejected: as a `PathRun` has them."""
+    """One tool path on the arm. collisions, rejected: as a `PathRun` has them. result: the film or
+    depth that it left, where its process has a target."""
 
     path: ToolPath
     strategy: Strategy
@@ -44,6 +46,7 @@ class SimulatedPath:
     collisions: tuple[Collision, ...]
     rejected: tuple[Collision, ...]
     metrics: PathMetrics
+    result: ExecutedResult | None = None
 
     def line(self, log: ExecutionLog) -> int:
         """The number of the line that a log's action is on; -1 between lines."""
@@ -126,11 +129,15 @@ def simulate(
         metrics = measure_path(
             region, path, strategy, cell, done.program, covered, reachability, done.logs
         )
+        process = simulation_job.process_of(path)
+        left = None
+        if process is not None:
+            left = executed_result(process, region, path, cell, done.logs, shift)
         clock("metrics")
         simulated.append(
             SimulatedPath(
                 path, strategy, cell, done.program, done.logs, done.collisions, done.rejected,
-                metrics,
+                metrics, left,
             )
         )  # fmt: skip
     if not any(p.metrics.reached for p in simulated):
