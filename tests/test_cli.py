@@ -33,10 +33,10 @@ def test_help_fits_a_screen_in_three_groups(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= 24 and max(map(len, lines)) <= 80
     listed = [line.split()[0] for line in lines if line.startswith("  ")]
-    users, makers = listed[:13], listed[13:]
+    users, makers = listed[:14], listed[14:]
     assert users == [
-        "teach", "check", "transfer", "retrieve", "align", "cell", "export", "simulate", "run",
-        "serve", "studio", "demo", "info",
+        "teach", "profile", "check", "transfer", "retrieve", "align", "cell", "export", "simulate",
+        "run", "serve", "studio", "demo", "info",
     ]  # fmt: skip
     assert makers == ["model", "eval", "ablate"]
 

@@ -18,9 +18,8 @@ USAGE = """usage: nrdf VERB ... [-v]
 Teach a surface process once, on one object; run it on every such object."""
 NOTES = """
 All options, with an example: nrdf VERB --help. Debug messages: -v; --version.
-Exit codes: 0 all well; 1 some shapes not used; 2 bad input; 3 a limit not met,
-or with --strict doubtful; 4 nothing found or planned; 130 Ctrl-C. With 3 and 4
-the result is written all the same."""
+Exit codes: 0 all well; 1 some shapes not used; 2 bad input. With a result: 3 a
+limit not met (--strict: doubtful); 4 nothing found or planned. 130 Ctrl-C."""
 
 GROUPS = ("cell", "model", "eval")
 """Verbs that have verbs of their own: calling one gives them, name to function."""
@@ -44,6 +43,7 @@ def verbs() -> dict[str, Verb]:
     from nrdf.commands.export import export
     from nrdf.commands.info import info
     from nrdf.commands.model import model
+    from nrdf.commands.profile import profile
     from nrdf.commands.retrieve import retrieve
     from nrdf.commands.run import run as run_line
     from nrdf.commands.serve import serve
@@ -53,8 +53,8 @@ def verbs() -> dict[str, Verb]:
     from nrdf.commands.transfer import transfer
 
     own = (
-        *(teach, check, transfer, retrieve, align, cell, export, simulate, run_line, serve, studio),
-        *(demo, info, model),
+        *(teach, profile, check, transfer, retrieve, align, cell, export, simulate, run_line),
+        *(serve, studio, demo, info, model),
     )
     return {**{verb.__name__: verb for verb in own}, **_verbs_of_other_packages()}
 
