@@ -27,7 +27,7 @@ from nrdf.studio.app import Studio
 from nrdf.studio.model.computing import ChildProcessComputing
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session import Session
-from nrdf.studio.mouse import camera_of
+from nrdf.studio.mouse import KEYS, camera_of
 from nrdf.studio.serving import open_server
 from nrdf.toolpath.file import read_toolpaths
 
@@ -85,7 +85,7 @@ class Person:
 
     def take(self, tool: str) -> None:
         """Another tool; the page says when it is in the hand."""
-        self.press(tool)
+        self.press(f"{tool} · {KEYS[tool]}")
         self.reads(f"Mouse tool {tool}:")
 
     def field(self, label: str):

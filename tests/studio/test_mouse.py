@@ -9,6 +9,7 @@ import numpy as np
 from builders.studio_page import face
 from builders.taught_box import cloud
 from nrdf.studio.model.document import REFERENCE
+from nrdf.studio.scene.drawing import about_point
 
 
 def test_a_drag_goes_on_while_work_ends(page, monkeypatch):
@@ -65,3 +66,29 @@ def test_a_target_without_a_result_is_not_painted(page):
     page.does(page.studio.mouse.select_tool, "Grow")
     view = page.studio.scene.objects["new"]
     assert "nothing is transferred to new yet" in page.does(page.studio.mouse._check, view)
+
+
+def test_two_clicks_measure(page):
+    mouse, hint = page.studio.mouse, page.studio.panel.hint
+    page.does(page.studio.panel._take, "Measure", None)
+    points = page.studio.scene.objects[REFERENCE].paintable.points
+    before = page.editor.document
+    one = click(page, "top")
+    x, y, z = 1e3 * points[one]
+    assert f"reference: **top**, x {x:.1f}, y {y:.1f}, z {z:.1f} mm" in hint.content
+    other = click(page, "front")
+    assert f"**{1e3 * np.linalg.norm(points[one] - points[other]):.1f} mm**" in hint.content
+    assert "measure" in page.studio.scene.objects[REFERENCE]._arrows
+    click(page, "top")
+    assert "from the first" not in hint.content, "the next one begins anew"
+    assert not page.studio.scene.objects[REFERENCE]._arrows.get("measure")
+    page.does(mouse.select_tool, "Orbit")
+    assert mouse.measured == "" and page.editor.document is before
+
+
+def test_a_point_of_a_target_has_a_confidence(page):
+    page.transfer()
+    result = page.studio.results.by_target["new"].transfer_result.regions["top"].match
+    index = int(result.indices[0])
+    said = about_point(page.editor, page.studio.results, "new", index)
+    assert f"**top** (confidence {result.confidence[0]:.2f})" in said

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import viser
@@ -12,10 +12,16 @@ from nrdf.errors import NrdfError
 from nrdf.studio.context import StudioContext
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.scene.camera import Camera, points_in_rectangle
-from nrdf.studio.scene.drawing import found_indices
+from nrdf.studio.scene.drawing import about_point, found_indices
 from nrdf.studio.scene.scene_view import ObjectView
 
-TOOLS = ("Orbit", "Grow", "Brush", "Box", "Direction", "Similarity")
+Key = Literal["O", "G", "B", "X", "D", "S", "M"]
+KEYS: dict[str, Key] = {
+    "Orbit": "O", "Grow": "G", "Brush": "B", "Box": "X", "Direction": "D", "Similarity": "S",
+    "Measure": "M",
+}  # fmt: skip
+"""The tools, and the key that takes each."""
+TOOLS = tuple(KEYS)
 _BRUSH = 0.4  # radius of the brush, in radii of a patch
 
 
@@ -39,12 +45,16 @@ class Mouse:
         self._grown: _GrownPatch | None = None
         self._drag: tuple[ObjectView, int] | None = None
         self._selects_boxes = False
+        self._measured: tuple[ObjectView, int] | None = None
+        self.measured = ""
+        """What was measured last, in Markdown."""
         context.server.scene.on_click()(self._clicked)
 
     def select_tool(self, tool: str) -> None:
         """Take another tool."""
         self.tool = tool
         self.forget_patch()
+        self._forget_measure()
         self.update_callbacks()
 
     def forget_patch(self) -> None:
@@ -81,9 +91,12 @@ class Mouse:
         context = self.context
         with context.reporting_errors():
             hit = context.scene.hit(np.array(event.ray_origin), np.array(event.ray_direction))
-            if hit is None or self.tool not in ("Grow", "Brush", "Similarity"):
+            if hit is None or self.tool not in ("Grow", "Brush", "Similarity", "Measure"):
                 return
             object_view, index = hit
+            if self.tool == "Measure":
+                self._measure(object_view, index)
+                return
             if self.tool == "Similarity":
                 context.compare(object_view.key, index)
                 return
@@ -96,6 +109,25 @@ class Mouse:
             self._grown = grown if grows else None
             self._paint(object_view, _painted(before, patch, self.erase))
             context.regions_changed()
+
+    def _measure(self, object_view: ObjectView, index: int) -> None:
+        """Say where a point is; every second one also how far it is from the first."""
+        context, first = self.context, self._measured
+        self.measured = about_point(context.editor, context.results, object_view.key, index)
+        if first is None or first[0] is not object_view:
+            self._forget_measure(keep=self.measured)
+            self._measured = object_view, index
+        else:
+            start, stop = object_view.paintable.points[[first[1], index]]
+            object_view.draw_arrow("measure", start, stop)
+            self.measured += f"  \n**{1e3 * np.linalg.norm(stop - start):.1f} mm** from the first"
+            self._measured = None
+        context.refresh_panel()
+
+    def _forget_measure(self, keep: str = "") -> None:
+        self._measured, self.measured = None, keep
+        for object_view in self.context.scene.objects.values():
+            object_view.draw_arrow("measure", None, None)
 
     def _boxed(self, event: viser.SceneRectSelectEvent) -> None:
         with self.context.reporting_errors():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Literal, Protocol
 
 from nrdf.studio.arm_simulation import ArmSimulation
 from nrdf.studio.context import StudioContext
-from nrdf.studio.mouse import TOOLS, Mouse
+from nrdf.studio.mouse import KEYS, TOOLS, Mouse
 from nrdf.studio.panels.inputs import Inputs, PanelEvent, ProgressBar
 from nrdf.studio.panels.process import ProcessTab
 from nrdf.studio.panels.reference import ReferenceTab
@@ -18,6 +19,7 @@ from nrdf.studio.panels.standing import unconfirmed
 from nrdf.studio.panels.targets import TargetsTab
 
 NO_REGION = "(none yet)"
+_IN_A_ROW = 4
 _HINTS = {
     "Orbit": "Drag to orbit, use the wheel to zoom, drag with the right button to pan.",
     "Grow": "Click the surface: a patch grows from there. Its **radius** is in step 2.",
@@ -26,6 +28,8 @@ _HINTS = {
     "Direction": "Drag on the reference along the direction of the tool path's lines.",
     "Similarity": "Click the reference, or move over it with the button held: points with similar "
     "descriptors are coloured on every object. How similar: a slider in step 4.",
+    "Measure": "Click a point: its regions, confidence and place, in the object's own frame. Click "
+    "another one: how far it is from the first.",
 }
 
 
@@ -58,7 +62,11 @@ class Panel:
         self.error = gui.add_markdown("", visible=False)
         self.working = ProgressBar(gui, cancel)
         self.simulating = ProgressBar(gui, lambda: simulation.worker.cancel())
-        self.tool = gui.add_button_group("Mouse tool", TOOLS)
+        rows = TOOLS[:_IN_A_ROW], TOOLS[_IN_A_ROW:]
+        self.tools = [
+            gui.add_button_group(name, [f"{tool} · {KEYS[tool]}" for tool in row])
+            for name, row in zip(("Mouse tool", " "), rows, strict=True)
+        ]
         self.hint = gui.add_markdown("")
         self.region = gui.add_dropdown(
             "Region", (NO_REGION,), hint="The region that is painted and described now."
@@ -79,7 +87,11 @@ class Panel:
         self._tabs: tuple[Tab, ...] = (
             self.reference, self.regions, self.process, self.targets, self.save, self.robot,
         )  # fmt: skip
-        inputs.on(self.tool.on_click, lambda event: self._select_tool(event.value))
+        for buttons in self.tools:
+            inputs.on(buttons.on_click, lambda event: self._select_tool(event.value.split(" ")[0]))
+        for tool, key in KEYS.items():
+            command = gui.add_command(f"Mouse tool: {tool}", hotkey=key)
+            inputs.on(command.on_trigger, partial(self._take, tool))
         inputs.on(self.region.on_update, lambda event: self._select_region(event.value))
         keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[PanelEvent], None]], ...] = (
             ("Undo", "Z", self.regions.undo), ("Redo", "Y", self.regions.redo),
@@ -97,7 +109,7 @@ class Panel:
             self.inputs.set_value(self.region, context.region or NO_REGION)
             self.next.content = f"**Next:** {next_step(context)}"
             tool = self.mouse.tool
-            self.hint.content = f"Mouse tool **{tool}**: {_HINTS[tool]}"
+            self.hint.content = f"Mouse tool **{tool}**: {self.mouse.measured or _HINTS[tool]}"
             for tab in self._tabs:
                 tab.refresh()
 
@@ -106,6 +118,9 @@ class Panel:
         if self.error.content != text:
             self.error.content = text
             self.error.visible = bool(text)
+
+    def _take(self, tool: str, _: PanelEvent) -> None:
+        self._select_tool(tool)
 
     def _select_tool(self, tool: str) -> None:
         self.mouse.select_tool(tool)

@@ -124,6 +124,26 @@ def doubts_of(editor: Editor, key: str) -> tuple[bool, np.ndarray]:
     return True, removed[:: 1 + len(removed) // _MOST_REMOVED]
 
 
+def about_point(editor: Editor, results: ResultCache, key: str, index: int) -> str:
+    """Where a shown point of an object is, mm, and of which regions, in Markdown."""
+    paintable = editor.paintable(key)
+    x, y, z = 1e3 * paintable.points[index]
+    names = []
+    for region in editor.document.regions:
+        found = found_indices(results, key, region.name)
+        if not editor.mask(key, region.name, found)[index]:
+            continue
+        target = editor.target(key)
+        sure = ""
+        if found is not None and target is not None and region.name not in target.corrected:
+            match = results.by_target[key].transfer_result.regions[region.name].match
+            own = match.confidence[np.asarray(found) == paintable.shown[index]]
+            sure = f" (confidence {float(own[0]):.2f})" if len(own) else ""
+        names.append(f"**{region.name}**{sure}")
+    where = ", ".join(names) or "no region"
+    return f"{key}: {where}, x {x:.1f}, y {y:.1f}, z {z:.1f} mm"
+
+
 def direction_of(editor: Editor, region: str, step: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Ends, each (3,), m, of the arrow along a step's lines on the reference, None for no arrow."""
     painted = editor.document.region(region)
