@@ -38,6 +38,13 @@ def test_samples_are_even_deterministic_and_about_a_quarter_radius_apart():
     assert samples.accessible.all() and samples.inside_margin.all()
 
 
+@pytest.mark.parametrize("off_m", [-0.002, 0.002])
+def test_a_region_of_a_scan_is_asked_about_on_the_mesh_that_was_given(off_m):
+    exact = block()
+    shifted = TargetMesh(exact.mesh.vertices + np.array([0.0, 0.0, off_m]), exact.mesh.faces)
+    assert RegionSamples.of(replace(exact, mesh=shifted), STRATEGY).accessible.all()
+
+
 def test_every_sample_stands_for_the_same_area_whatever_the_triangles():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.01, 0.01, 0]], float)
     faces = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])

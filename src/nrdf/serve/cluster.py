@@ -37,9 +37,9 @@ def map_objects(
 
     workers: local processes; 1 is a plain loop in this process. cluster: address of a Dask
     scheduler instead, whose workers see the same files and have the same nrdf. An error of the
-    function is raised as it comes; a task whose worker dies is done once more, and is then a
-    ClusterError as its result. Raises ConfigError where the package distributed is missing, and
-    ClusterError for a scheduler that cannot be reached or goes away.
+    function is raised as it comes; a task whose worker dies twice is done last, by itself, and
+    where that worker dies too, a ClusterError is its result. Raises ConfigError where the package
+    distributed is missing, and ClusterError for a scheduler that cannot be reached or goes away.
     """
     if cluster is None and workers == 1:
         yield from ((index, function(*item)) for index, item in enumerate(items))
@@ -105,15 +105,35 @@ def _mapped(
         return futures
 
     ahead = _IN_FLIGHT * max(len(client.scheduler_info(n_workers=-1)["workers"]), 2)
-    coming = as_completed(send(ahead))
-    for future in coming:
-        index = indices.pop(future.key)
+
+    def outcome(future: Any) -> tuple[Any, ...]:
+        """A task's result, alone in a tuple; none where its workers died."""
         try:
-            result = future.result()
+            return (future.result(),)
         except KilledWorker:
-            result = ClusterError("its worker died twice: too little memory, perhaps")
+            return ()
         except (CommClosedError, CancelledError) as error:
             raise ClusterError(_GONE) from error
-        future.release()
+        finally:
+            future.release()
+
+    coming = as_completed(send(ahead))
+    suspects = []
+    for future in coming:
+        index, result = indices.pop(future.key), outcome(future)
         coming.update(send(1))
-        yield index, result
+        if result:
+            yield index, result[0]
+        else:
+            suspects.append(index)
+    # Whatever waits at a worker goes down with it: which task it was shows when each is alone.
+    for index in suspects:
+        result = outcome(client.submit(function, *items[index], pure=False))
+        yield (
+            index,
+            result[0]
+            if result
+            else ClusterError(
+                "its worker died whenever it was at work on it: too little memory, perhaps"
+            ),
+        )
