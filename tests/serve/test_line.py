@@ -15,11 +15,16 @@ import pytest
 from builders.line_process import environment
 from nrdf.serve import line as line_module
 from nrdf.serve.outbox import OBJECT
+from nrdf.serve.store import OUTCOMES
 
 
 def folders(out):
-    """Name and outcome of every object's folder."""
-    return {p.parent.name: p.parent.parent.name for p in out.glob(f"*/*/{OBJECT}")}
+    """Name and outcome of every object's folder; none of those that are still being written."""
+    return {p.parent.name: p.parent.parent.name for p in published(out)}
+
+
+def published(out):
+    return [file for state in OUTCOMES for file in out.glob(f"{state}/*/{OBJECT}")]
 
 
 def test_every_object_gets_its_outcome_and_its_folder(start, finish, tmp_path):
@@ -94,7 +99,7 @@ def test_kill_9_at_random_moments_loses_nothing_and_does_nothing_twice(tmp_path)
         process.wait()
         kills += 1
     assert kills >= 3
-    found = [p.parent for p in out.glob(f"*/*/{OBJECT}")]
+    found = [file.parent for file in published(out)]
     assert Counter(p.name for p in found) == Counter(names)
     for folder in found:
         said = json.loads((folder / OBJECT).read_text())
