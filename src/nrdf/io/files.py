@@ -6,6 +6,7 @@ end. Every reader of users' files opens them here, or calls `require_file` first
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import BinaryIO
 
 from nrdf.errors import NrdfError
 
+_PART = 1 << 20  # bytes that are read at once
 _KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe (FIFO)",
@@ -47,6 +49,14 @@ def open_file(path: str | Path, error: type[NrdfError]) -> BinaryIO:
         file.close()
         raise
     return file
+
+
+def sha256_of(file: BinaryIO) -> str:
+    """SHA-256 of what is left of an open file, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    while part := file.read(_PART):
+        digest.update(part)
+    return digest.hexdigest()
 
 
 def read_file(path: str | Path, error: type[NrdfError], most: int) -> bytes:

@@ -7,7 +7,6 @@ are renamed to NAME.kept where the new result has a file of that name. Links are
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import os
@@ -18,7 +17,7 @@ from typing import NamedTuple
 
 from nrdf.errors import OutputError
 from nrdf.io.atomic import write_atomically
-from nrdf.io.files import read_file
+from nrdf.io.files import read_file, sha256_of
 from nrdf.io.locks import hidden_path, leftover_folders, lock_folder
 
 log = logging.getLogger(__name__)
@@ -26,7 +25,6 @@ log = logging.getLogger(__name__)
 MANIFEST = ".nrdf-files.json"
 REPORT = "report.json"
 _LARGEST_MANIFEST = 1 << 26
-_CHUNK = 1 << 20
 
 
 class _Entry(NamedTuple):
@@ -215,11 +213,9 @@ def _is_own(path: Path, name: str, entries: set[_Entry]) -> bool:
 
 
 def _file_entry(path: Path, name: str) -> _Entry:
-    digest = hashlib.sha256()
     with open(path, "rb") as file:
-        while block := file.read(_CHUNK):
-            digest.update(block)
-    return _Entry(name, path.stat().st_size, digest.hexdigest())
+        digest = sha256_of(file)
+    return _Entry(name, path.stat().st_size, digest)
 
 
 def _read_manifest(folder: Path) -> set[_Entry]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -14,7 +13,7 @@ from nrdf.errors import CloudError, NrdfError, ProcessError
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.geometry.units import METRES, USUAL_SIZES, guess_unit
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
-from nrdf.io.files import open_file
+from nrdf.io.files import open_file, sha256_of
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import listed, read_knowledge
 from nrdf.regions.files import read_region_file
@@ -141,11 +140,8 @@ def checksum(path: Path) -> str:
 
     Raises ProcessError if it is not a regular file, for instance the folder of a bag.
     """
-    digest = hashlib.sha256()
     with open_file(path, ProcessError) as file:
-        while part := file.read(1 << 20):
-            digest.update(part)
-    return digest.hexdigest()
+        return sha256_of(file)
 
 
 def _usual(category: str) -> str:

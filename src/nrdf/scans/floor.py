@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.geometry.canonical import bounding_box
+from nrdf.geometry.mesh import triangle_crosses
 from nrdf.geometry.sampling import downsample
 
 _SAMPLE = 3000  # points that hypotheses are tested on
@@ -42,11 +43,11 @@ def find_floor(points: np.ndarray, up: np.ndarray | None, rng: np.random.Generat
     sample = points[downsample(points, _SAMPLE, rng)]
     low, high = bounding_box(sample)
     thickness = _THICKNESS * float((high - low).max())
-    corners = sample[rng.integers(0, len(sample), (_HYPOTHESES, 3))]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    drawn = rng.integers(0, len(sample), (_HYPOTHESES, 3))
+    normals = triangle_crosses(sample, drawn)
     length = np.linalg.norm(normals, axis=1)
     good = length > thickness**2
-    normals, corners = normals[good] / length[good, None], corners[good, 0]
+    normals, corners = normals[good] / length[good, None], sample[drawn[good, 0]]
     if up is not None:
         normals *= np.where(normals @ up < 0, -1.0, 1.0)[:, None]
         level = normals @ up > _TILT

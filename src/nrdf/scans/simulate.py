@@ -9,7 +9,7 @@ import numpy as np
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
-from nrdf.geometry.mesh import check_mesh
+from nrdf.geometry.mesh import check_mesh, triangle_crosses
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 
@@ -94,8 +94,7 @@ def simulate_scan(
         place = middle + settings.distance * size * toward
         rays = _rays(toward, radius / (settings.distance * size), settings.pixels)
         face, depth, weights = _cast(tree, vertices, faces, place, rays)
-        corners = vertices[faces[np.maximum(face, 0)]]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = triangle_crosses(vertices, faces[np.maximum(face, 0)])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         if settings.floor:
             drop = np.where(rays[:, 1] < -1e-6, (ground - place[1]) / rays[:, 1], np.inf)

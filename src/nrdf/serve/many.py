@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from nrdf.errors import NrdfError
+from nrdf.io.files import sha256_of
 from nrdf.io.result_folder import REPORT
 from nrdf.process.limits import Limits
 from nrdf.serve.object_transfer import ObjectTransfer, doubts
@@ -134,8 +135,5 @@ def _checksum(path: Path) -> str:
     if path.is_dir():
         found = sorted((p.name, p.stat().st_size, p.stat().st_mtime_ns) for p in path.iterdir())
         return hashlib.sha256(os.fsencode(str(found))).hexdigest()
-    digest = hashlib.sha256()
     with open(path, "rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+        return sha256_of(file)

@@ -17,6 +17,7 @@ from trimesh import remesh
 
 from nrdf.errors import DataError
 from nrdf.geometry.canonical import canonical_transform
+from nrdf.geometry.frames import unit_vectors
 from nrdf.geometry.mesh import (
     Skin,
     check_mesh,
@@ -160,10 +161,7 @@ def whole_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: s
 
 def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
     """A car with bonnet, roof and right door, told by the place and normal of the faces."""
-    vertices, faces = _divided(vertices, faces)
-    centre = vertices[faces].mean(axis=1)
-    cross = triangle_crosses(vertices, faces)
-    normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
+    vertices, faces, centre, normal = _divided(vertices, faces)
     low, high = vertices[:, 1].min(), vertices[:, 1].max()
     height = (centre[:, 1] - low) / (high - low)  # 0 to 1
     side = centre[:, 2] / vertices[:, 2].max()  # 1: the right-hand side
@@ -181,10 +179,7 @@ def car_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str
 
 def plane_target(name: str, vertices: np.ndarray, faces: np.ndarray, checksum: str) -> MeshTarget:
     """An aircraft with the upper side of its right wing, told by the place and normal of faces."""
-    vertices, faces = _divided(vertices, faces)
-    centre = vertices[faces].mean(axis=1)
-    cross = triangle_crosses(vertices, faces)
-    normal = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15)
+    vertices, faces, centre, normal = _divided(vertices, faces)
     back, front = vertices[:, 0].min(), vertices[:, 0].max()
     along = (centre[:, 0] - back) / (front - back)  # 0 to 1; the tail's fins lie below 0.25
     side = centre[:, 2] / vertices[:, 2].max()  # 1: the right wing's tip
@@ -210,14 +205,19 @@ def _largest(faces: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.asarray(piece == np.bincount(piece[mask]).argmax())
 
 
-def _divided(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A mesh of size 1 in triangles so small that a region of whole ones has an even border.
+def _divided(
+    vertices: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A mesh of size 1 in triangles so small that a region of whole ones has an even border: its
+    vertices (v, 3), faces (f, 3), and the faces' middles (f, 3) and outward unit normals (f, 3).
 
     Doors and wings are modelled in triangles as long as they are; the surface stays as it is.
     """
     vertices, faces = remesh.subdivide_to_size(_scaled(vertices, 1.0), faces, _EDGE)
     vertices, faces, _ = clean_faces(vertices, faces)
-    return vertices, _outward(vertices, faces)
+    faces = _outward(vertices, faces)
+    normals = unit_vectors(triangle_crosses(vertices, faces))
+    return vertices, faces, vertices[faces].mean(axis=1), normals
 
 
 def _scaled(vertices: np.ndarray, size_m: float) -> np.ndarray:
