@@ -265,7 +265,9 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
     into = np.array([*path.approach, path.joints[0]])
     out = np.array([path.joints[-1], *path.retract])
 
-    towards = path.first + np.ceil(path.waypoint[1:] - 1e-9).astype(int)
+    # Feeds are of the ways' middles: from one to the next the speed changes evenly.
+    middle = path.first + 0.5 * (path.waypoint[1:] + path.waypoint[:-1]) + 0.5
+    feeds = np.interp(middle, np.arange(len(process.speeds_m_s)), process.speeds_m_s)
 
     def action(
         kind: ActionKind, joints: np.ndarray, number: np.ndarray, feed: float | np.ndarray
@@ -292,6 +294,6 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
 
     return [
         action("approach", into, np.arange(float(len(into))), approach.feed_m_s),
-        action("process", path.dense, path.waypoint, process.speeds_m_s[towards]),
+        action("process", path.dense, path.waypoint, feeds),
         action("retract", out, np.arange(float(len(out))), retract.feed_m_s),
     ]
