@@ -1,7 +1,6 @@
 """The paper's seven losses, and those that use known correspondences.
 
-Equation numbers are the paper's: (3) is the Chamfer distance and (7) the descriptor distance; the
-others follow from the order in which the paper's third stage lists its losses.
+Equation numbers are the paper's. Where a loss differs from its equation, its docstring says so.
 
 Every loss is a function of a `LossContext`: a batch and what the field computes from it.
 """
@@ -126,7 +125,7 @@ def roughness(context: LossContext, values: Tensor) -> Tensor:
 
 
 def occupancy(context: LossContext) -> Tensor:
-    """(1): −[o log ô + (1 − o) log(1 − ô)], averaged over queries."""
+    """−[o log ô + (1 − o) log(1 − ô)], averaged over queries (first stage; no number)."""
     return functional.binary_cross_entropy_with_logits(context.logits, context.batch.occupancy)
 
 
@@ -148,13 +147,20 @@ def emd(context: LossContext) -> Tensor:
 
 
 def descriptor_smoothness(context: LossContext) -> Tensor:
-    """(5): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1."""
+    """(6): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1.
+
+    The paper permutes the points of random patches, and compares each with its neighbour in the
+    new order; this compares every centre with all of its patch.
+    """
     return roughness(context, context.descriptors.float())
 
 
 def normal_consistency(context: LossContext) -> Tensor:
-    """(6): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
-    by local PCA, its sign from the normal that x had on shape i."""
+    """(5): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
+    by local PCA, its sign from the normal that x had on shape i.
+
+    The paper adds the other direction, from shape j to the reconstruction.
+    """
     ours = local_normals(context.cross_reconstruction, towards=context.cloud_normals)
     theirs = gather(
         context.cloud_normals[context.partner],
@@ -167,8 +173,9 @@ def descriptor_distance(context: LossContext) -> Tensor:
     """(7): Chamfer distance between the descriptors of the cross reconstruction, taken on shape j,
     and those of shape i that it was made from.
 
-    The paper writes it squared and in one direction; as in its released code the distances are
-    not squared and both directions are averaged.
+    The paper writes it squared, and for each point of shape j with the descriptor of the point that
+    it corresponds to; as in its released code the distances are those to the nearest descriptor,
+    not squared, and both directions are averaged.
     """
     ours = context.field.describe(
         context.z[context.partner], context.cross_reconstruction, context.cloud_normals
@@ -178,7 +185,7 @@ def descriptor_distance(context: LossContext) -> Tensor:
 
 
 def displacement_smoothness(context: LossContext) -> Tensor:
-    """IMDC's smoothness (Liu & Liu 2020): of the displacements C(z_j, θ(z_i, x)) − x, as (5) has it
+    """IMDC's smoothness (Liu & Liu 2020): of the displacements C(z_j, θ(z_i, x)) − x, as (6) has it
     of descriptors."""
     return roughness(context, context.cross_reconstruction - context.cloud)
 

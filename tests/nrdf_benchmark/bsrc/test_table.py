@@ -46,12 +46,18 @@ def test_ours_first_and_what_is_published_below(benchmark, results):
     *by_roi, mean, seconds = cells(found[1], "cd-l1")
     assert by_roi == [f"{value:.3f}" for value in results[1].by_roi("cd-l1")]
     assert mean == f"{results[1].mean():.4f}" and float(seconds) >= 0
-    assert cells(found[-1], "cd-l1") == [""] * 8 + ["0.039", ""]
+    published = ["0.025", "0.029", "0.042", "0.029", "0.051", "0.047", "0.048", "0.044"]
+    assert cells(found[-1], "cd-l1") == [*published, "0.039", ""]
 
 
 def test_published_regions_have_the_published_mean():
-    for (category, name), by_roi in PUBLISHED_BY_ROI.items():
-        assert np.mean(by_roi) == pytest.approx(PUBLISHED[category][name], abs=0.0005)
+    for category, means in PUBLISHED.items():
+        for name, mean in means.items():
+            by_roi = PUBLISHED_BY_ROI[category, name]
+            assert len(by_roi) == len(ROIS[category])
+            # One row of the paper does not add up: the regions of NDF's planes give 0.1396.
+            apart = 0.0025 if (category, name) == ("plane", "NDF") else 0.0008
+            assert np.mean(by_roi) == pytest.approx(mean, abs=apart)
 
 
 def test_other_metrics_have_no_published_rows(benchmark, results):
