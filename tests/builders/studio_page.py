@@ -12,6 +12,11 @@ from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.session import Session
 
 
+def small_box(scale=1.0, seed=0):
+    """A box of half the size of `taught_box`, so that meshes of its points are small."""
+    return cloud(0.5 * scale * SIZE, seed=seed)
+
+
 def silent(done, total):
     """Ignores progress."""
 
@@ -26,10 +31,10 @@ def face(of, name):
 def box_editor(folder, **kinds):
     """An editor with a box; each region is a face of it, with a process of that kind."""
     editor = Editor(Session(folder))
-    editor.open_reference("box.ply", cloud(), "chair")
+    editor.open_reference("box.ply", small_box(), "chair")
     for name, kind in kinds.items():
         editor.add_region(name)
-        editor.paint(REFERENCE, name, face(cloud(), name))
+        editor.paint(REFERENCE, name, face(small_box(), name))
         editor.restart_step(name, 0, kind)
     return editor
 
@@ -54,11 +59,11 @@ class Page:
 
         self.studio.notify = noted
         self.editor = self.studio.editor
-        self.editor.open_reference("box.ply", cloud(), "chair")
+        self.editor.open_reference("box.ply", small_box(), "chair")
         for name in ("top", "front"):
             self.editor.add_region(name)
-            self.paint(name, faces(cloud())[name])
-        self.editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+            self.paint(name, faces(small_box())[name])
+        self.editor.add_target("new.ply", small_box(1.1, seed=1))
         self.studio.sync()
         self.studio.region = "top"
 
@@ -70,7 +75,7 @@ class Page:
 
     def paint(self, name, indices):
         """Set a region of the reference."""
-        mask = np.zeros(len(cloud()), bool)
+        mask = np.zeros(len(small_box()), bool)
         mask[indices] = True
         self.editor.paint(REFERENCE, name, mask)
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import nrdf
-from builders.studio_page import Page, box_editor
-from builders.taught_box import SIZE, cloud
+from builders.studio_page import Page, box_editor, small_box
 
 
 @pytest.fixture
@@ -25,7 +24,7 @@ def results(tmp_path, untrained):
     from nrdf.studio.model.result_cache import ResultCache
 
     editor = box_editor(tmp_path / "session", top="sand", front="oil")
-    editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+    editor.add_target("new.ply", small_box(1.1, seed=1))
     return ResultCache(editor, LocalComputing(lambda category: nrdf.load_model(untrained)))
 
 

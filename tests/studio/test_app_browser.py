@@ -27,7 +27,7 @@ from nrdf.studio.app import Studio
 from nrdf.studio.model.computing import ChildProcessComputing
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session import Session
-from nrdf.studio.mouse import KEYS, camera_of
+from nrdf.studio.mouse import camera_of
 from nrdf.studio.serving import open_server
 from nrdf.toolpath.file import read_toolpaths
 
@@ -85,7 +85,7 @@ class Person:
 
     def take(self, tool: str) -> None:
         """Another tool; the page says when it is in the hand."""
-        self.press(f"{tool} · {KEYS[tool]}")
+        self.press(tool)
         self.reads(f"Mouse tool {tool}:")
 
     def field(self, label: str):
@@ -192,7 +192,7 @@ def person(studio):
     SHOTS.mkdir(parents=True, exist_ok=True)
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=list(FLAGS))
-        page = browser.new_page(viewport={"width": 820, "height": 560}, accept_downloads=True)
+        page = browser.new_page(viewport={"width": 1000, "height": 600}, accept_downloads=True)
         page.set_default_timeout(1e3 * PATIENCE_S)
         page.add_init_script(SELDOM)
         page.goto(f"http://127.0.0.1:{studio.server.get_port()}")

@@ -55,9 +55,8 @@ class Studio(StudioContext):
             self.show_error(f"⚠ **The session was damaged**: {session.damage}")
 
     def restore(self) -> None:
-        """Show the session from the beginning, and compute what it needs."""
+        """Show the session from the beginning. Nothing is computed until a person asks for it."""
         with self.lock:
-            document = self.editor.document
             self.worker.cancel()
             self.arm_simulation.worker.cancel()
             self.arm_simulation.clear()
@@ -67,10 +66,6 @@ class Studio(StudioContext):
             self.mouse.forget_patch()
             self.region, self.step, self.shown_target = "", 0, None
             self.sync()
-            if document.regions:
-                self.plan(0.0)
-            if any(region.mask.any() for region in document.regions) and document.targets:
-                self.transfer()
 
     def sync(self) -> None:
         """Bring scene and panel to what the document says."""
@@ -168,6 +163,8 @@ class Studio(StudioContext):
         def ended(what: str, error: str) -> None:
             bar.ended()
             self.notify_end(what, error)
+            with self.lock:
+                self.panel.refresh()
 
         return ended
 

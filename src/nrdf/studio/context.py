@@ -74,6 +74,8 @@ class StudioContext(ABC):
         self.lock = threading.RLock()
         self.region, self.step, self.radius_m = "", 0, 0.05
         self.colouring, self.similarity_width = COLOURINGS[0], 0.15
+        self.read_only: set[int] = set()
+        """The ids of browsers that may only look, as phones."""
         self.shown_target: str | None = None
         """The one target that is shown beside the reference, None for all."""
         self._distances: dict[str, np.ndarray] = {}
@@ -84,7 +86,7 @@ class StudioContext(ABC):
 
     @abstractmethod
     def restore(self) -> None:
-        """Show the session from the beginning, and compute what it needs."""
+        """Show the session from the beginning. Nothing is computed until a person asks for it."""
 
     @abstractmethod
     def sync(self) -> None:
@@ -160,7 +162,6 @@ class StudioContext(ABC):
         if self.colouring == "similarity":
             self.colouring = COLOURINGS[0]
         self.draw()
-        self.refresh_panel()
         self.plan()
         current = self.results.is_current
         targets = self.editor.document.targets
@@ -181,6 +182,7 @@ class StudioContext(ABC):
         document = self.editor.document
         self._submit("plan", "planning on the reference", delay_s,
                      lambda progress: self.results.make_plans(document, progress))  # fmt: skip
+        self.refresh_panel()
 
     def transfer(self, delay_s: float = 0.0) -> None:
         """Transfer the processes to the targets."""

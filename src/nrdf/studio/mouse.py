@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import viser
@@ -11,17 +12,11 @@ import viser
 from nrdf.errors import NrdfError
 from nrdf.studio.context import StudioContext
 from nrdf.studio.model.document import REFERENCE
-from nrdf.studio.scene.camera import Camera, points_in_rectangle
+from nrdf.studio.scene.camera import Camera, points_in_outline, points_in_rectangle
 from nrdf.studio.scene.drawing import about_point, found_indices
 from nrdf.studio.scene.scene_view import ObjectView
+from nrdf.studio.tools import ACTS, ERASE, TOOLS, tool
 
-Key = Literal["O", "G", "B", "X", "D", "S", "M"]
-KEYS: dict[str, Key] = {
-    "Orbit": "O", "Grow": "G", "Brush": "B", "Box": "X", "Direction": "D", "Similarity": "S",
-    "Measure": "M",
-}  # fmt: skip
-"""The tools, and the key that takes each."""
-TOOLS = tuple(KEYS)
 _BRUSH = 0.4  # radius of the brush, in radii of a patch
 
 
@@ -36,23 +31,34 @@ class _GrownPatch:
     erase: bool
 
 
+@dataclass(frozen=True)
+class _MovedBorder:
+    """A border that was moved by millimetres: from what region (k,), by how much, m, to which."""
+
+    before: np.ndarray
+    by_m: float
+    after: np.ndarray
+
+
 class Mouse:
-    """The tools. erase: painting takes away; through: a box also takes hidden points."""
+    """The tools. erase: painting takes away; through: a rectangle also takes hidden points."""
 
     def __init__(self, context: StudioContext) -> None:
         self.context = context
-        self.tool, self.erase, self.through = TOOLS[0], False, False
+        self.tool, self.erase, self.through = TOOLS[0].name, False, False
         self._grown: _GrownPatch | None = None
         self._drag: tuple[ObjectView, int] | None = None
+        self._painted = REFERENCE
+        self._moved: _MovedBorder | None = None
         self._selects_boxes = False
         self._measured: tuple[ObjectView, int] | None = None
         self.measured = ""
         """What was measured last, in Markdown."""
         context.server.scene.on_click()(self._clicked)
 
-    def select_tool(self, tool: str) -> None:
-        """Take another tool."""
-        self.tool = tool
+    def select_tool(self, name: str) -> None:
+        """Take another tool. Raises KeyError for one that there is not."""
+        self.tool = tool(name).name
         self.forget_patch()
         self._forget_measure()
         self.update_callbacks()
@@ -67,7 +73,7 @@ class Mouse:
         Callbacks that are set already are left alone: removing one ends the drag under way.
         """
         scene = self.context.server.scene
-        boxes, drags = self.tool == "Box", self.tool in ("Brush", "Direction", "Similarity")
+        boxes, drags = self.tool == "Rectangle", self.tool in ("Brush", "Direction", "Similarity")
         if boxes != self._selects_boxes:
             self._selects_boxes = boxes
             if boxes:
@@ -86,6 +92,55 @@ class Mouse:
         patch = grown.object_view.paintable.canvas.patch(grown.index, radius_m)
         self._paint(grown.object_view, _painted(grown.before, patch, grown.erase), merge=True)
         self.context.regions_changed()
+
+    def act(self, name: str) -> None:
+        """Erase from now on, or not; or do one of `ACTS` to the selected region, on the object that
+        was painted on last. Raises NrdfError where there is nothing to do it to."""
+        if name == ERASE.name:
+            self.erase = not self.erase
+            return
+        self.context.need_region()
+        keys = self.context.editor.object_keys()
+        view = self.context.scene.objects[self._painted if self._painted in keys else REFERENCE]
+        self._check(view)
+        mask, canvas = self._current(view), view.paintable.canvas
+        if not mask.any():
+            raise NrdfError(f"{self.context.region} has no points yet: paint some first")
+        self.forget_patch()
+        if name == ACTS[0].name:
+            mask = canvas.filled(mask)
+        elif name == ACTS[1].name:
+            mask = canvas.smoothed(mask)
+        else:
+            mask = self._moved_border(view, mask, 1e-3 if name == ACTS[3].name else -1e-3)
+        self._paint(view, mask)
+        self.context.regions_changed()
+
+    def _moved_border(self, view: ObjectView, mask: np.ndarray, by_m: float) -> np.ndarray:
+        """Points lie farther apart than a millimetre, so moves in a row count from the first."""
+        moved = self._moved
+        if moved is None or not np.array_equal(moved.after, mask):
+            moved = _MovedBorder(mask, 0.0, mask)
+        total = moved.by_m + by_m
+        after = view.paintable.canvas.offset(moved.before, total) if total else moved.before
+        self._moved = _MovedBorder(moved.before, total, after)
+        return after
+
+    def select_outline(self, client: viser.ClientHandle, outline: np.ndarray) -> None:
+        """Paint the points that a browser shows within an outline (m, 2) of its screen."""
+        camera = camera_of(client)
+        self._select(lambda view: points_in_outline(
+            view.camera(camera), view.paintable.points, view.paintable.normals, outline,
+            view.paintable.surface.spacing,
+        ))  # fmt: skip
+
+    def under(self, camera: Camera, screen: tuple[float, float]) -> str:
+        """What is seen at a place of the screen, in Markdown; "" for nothing."""
+        context = self.context
+        hit = context.scene.hit(camera.position, camera.ray(screen))
+        if hit is None:
+            return ""
+        return about_point(context.editor, context.results, hit[0].key, hit[1])
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
         context = self.context
@@ -133,18 +188,20 @@ class Mouse:
         with self.context.reporting_errors():
             corners = (event.screen_min, event.screen_max)
             camera = camera_of(event.client)
-            for key in self.context.visible_objects():
-                object_view = self.context.scene.objects[key]
-                cloud = object_view.paintable
-                chosen = points_in_rectangle(
-                    object_view.camera(camera), cloud.points, cloud.normals, corners,
-                    cloud.surface.spacing, self.through,
-                )  # fmt: skip
-                if chosen.any():
-                    self._check(object_view)
-                    mask = _painted(self._current(object_view), chosen, self.erase)
-                    self._paint(object_view, mask)
-            self.context.regions_changed()
+            self._select(lambda view: points_in_rectangle(
+                view.camera(camera), view.paintable.points, view.paintable.normals, corners,
+                view.paintable.surface.spacing, self.through,
+            ))  # fmt: skip
+
+    def _select(self, chosen_of: Callable[[ObjectView], np.ndarray]) -> None:
+        """Paint on every visible object what `chosen_of` it gives, (k,) bool."""
+        for key in self.context.visible_objects():
+            view = self.context.scene.objects[key]
+            chosen = chosen_of(view)
+            if chosen.any():
+                self._check(view)
+                self._paint(view, _painted(self._current(view), chosen, self.erase))
+        self.context.regions_changed()
 
     async def _dragged(self, event: viser.SceneNodeDragEvent[Any]) -> None:
         # On the event loop, so that the parts of a drag come in order.
@@ -204,6 +261,7 @@ class Mouse:
         return context.editor.mask(key, context.region, found)
 
     def _paint(self, object_view: ObjectView, mask: np.ndarray, merge: bool = False) -> None:
+        self._painted = object_view.key
         self.context.editor.paint(object_view.key, self.context.region, mask, merge)
         self.context.draw_colours(object_view)
 

@@ -19,6 +19,7 @@ from websockets.asyncio.server import Request, Response, ServerConnection
 from nrdf.errors import OutputError
 from nrdf.serve.hosts import allowed_hosts, is_own_page, serves
 from nrdf.studio.model.uploads import LARGEST_UPLOAD, shown_name, too_large
+from nrdf.studio.page_requests import PageRequests
 
 _WRONG_HOST = "the studio answers to the address that it has printed; --allow-host adds a name\n"
 _WRONG_ORIGIN = "the studio answers to its own pages alone\n"
@@ -30,7 +31,13 @@ _CLOSED = {
 """So that no other page shows this one within itself, and takes clicks for it."""
 
 
-def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> viser.ViserServer:
+class StudioServer(viser.ViserServer):
+    """page: what the page asks for beside viser's own."""
+
+    page: PageRequests
+
+
+def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> StudioServer:
     """A viser server with nothing on it; on the next free port where `port` is taken.
 
     Only its own pages may connect, by loopback's names, `host` and `more_hosts`: neither a page of
@@ -42,21 +49,23 @@ def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> viser.V
         raise OutputError(f"--port {port}: must be from 1 to 65535")
     _check(host)
     # viser hands no such limit on to websockets, and prints a banner of its own.
-    serve = websockets.asyncio.server.serve
+    serve, page = websockets.asyncio.server.serve, PageRequests()
+    own = _serve_own(serve, allowed_hosts(host, more_hosts), page)
     with (
-        patch.object(
-            websockets.asyncio.server, "serve", _serve_own(serve, allowed_hosts(host, more_hosts))
-        ),
+        patch.object(websockets.asyncio.server, "serve", own),
         contextlib.redirect_stdout(io.StringIO()),
     ):
-        server = viser.ViserServer(host, port, label="nrdf studio", verbose=False)
+        server = StudioServer(host, port, label="nrdf studio", verbose=False)
+    server.page = page
     # Every page could ask for a public address that leads here.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
     _limit_uploads(server)
     return server
 
 
-def _serve_own(serve: Callable[..., Any], allowed: frozenset[str]) -> Callable[..., Any]:
+def _serve_own(
+    serve: Callable[..., Any], allowed: frozenset[str], page: PageRequests
+) -> Callable[..., Any]:
     """websockets' `serve` for these names of this machine, and for its own pages alone."""
 
     def serve_own(*args: Any, process_request: Any = None, **options: Any) -> Any:
@@ -66,7 +75,9 @@ def _serve_own(serve: Callable[..., Any], allowed: frozenset[str]) -> Callable[.
                 return connection.respond(HTTPStatus.FORBIDDEN, _WRONG_HOST)
             if not all(is_own_page(o, hosts[0]) for o in request.headers.get_all("Origin")):
                 return connection.respond(HTTPStatus.FORBIDDEN, _WRONG_ORIGIN)
-            found: Response | None = process_request and process_request(connection, request)
+            found: Response | None = page.respond(request)
+            if found is None and process_request:
+                found = process_request(connection, request)
             if found is not None:
                 found.headers.update(_CLOSED)
             return found

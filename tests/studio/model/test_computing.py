@@ -14,7 +14,8 @@ import pytest
 pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 
 import nrdf
-from builders.taught_box import SIZE, cloud, faces
+from builders.studio_page import small_box
+from builders.taught_box import faces
 from nrdf.errors import CloudError
 from nrdf.io.cloud import write_cloud
 from nrdf.studio.app import Studio
@@ -40,12 +41,12 @@ def silent(done, total):
 
 def painted_editor(folder):
     editor = Editor(Session(folder))
-    editor.open_reference("box.ply", cloud(), "chair")
+    editor.open_reference("box.ply", small_box(), "chair")
     editor.add_region("top")
-    mask = np.zeros(len(cloud()), bool)
-    mask[faces(cloud())["top"]] = True
+    mask = np.zeros(len(small_box()), bool)
+    mask[faces(small_box())["top"]] = True
     editor.paint(REFERENCE, "top", mask)
-    editor.add_target("new.ply", cloud(1.1 * SIZE, seed=1))
+    editor.add_target("new.ply", small_box(1.1, seed=1))
     return editor
 
 
@@ -95,10 +96,10 @@ def test_a_process_answers_what_is_answered_here(tmp_path, untrained, separate):
     )
     assert process.stepover_m == 0.02, "what was changed after it was cancelled"
 
-    write_cloud(tmp_path / "box.ply", cloud())
+    write_cloud(tmp_path / "box.ply", small_box())
     content = (tmp_path / "box.ply").read_bytes()
     read = there.read("box.ply", content, "chair", None, silent)
-    np.testing.assert_allclose(read.points, cloud().points)
+    np.testing.assert_allclose(read.points, small_box().points)
     with pytest.raises(CloudError, match=r"^box\.ply: "):
         there.read("box.ply", content[:-100], "chair", None, silent)
 
@@ -109,6 +110,11 @@ def test_a_studio_outlives_what_computes_and_opens_again(tmp_path, separate, dea
     server = open_server("127.0.0.1", 8490)
     studio = Studio(Session(tmp_path / "s"), server, separate, ["chair"], {})
     try:
+        time.sleep(0.5)
+        assert separate._child is None and not studio.worker.busy, "it plans nothing by itself"
+        with studio.reporting_errors():
+            studio.plan(0.0)
+            studio.transfer()
         assert studio.worker.wait(120)
         died = "has ended by itself (signal 11, Segmentation fault)"
         until(lambda: died in studio.panel.error.content)

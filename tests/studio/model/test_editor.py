@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from builders.studio_page import face
-from builders.taught_box import SIZE, cloud
+from builders.studio_page import face, small_box
 from nrdf.errors import ProcessError, RegionError
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of
@@ -24,7 +23,7 @@ def test_names_of_regions(painted):
 
 
 def test_corrections_follow_their_region(painted):
-    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    painted.add_target("other.ply", small_box(seed=1))
     painted.paint("other", "top", face(painted.paintable("other").cloud, "top"))
     painted.rename_region("top", "lid")
     assert list(painted.target("other").corrected) == ["lid"]
@@ -36,7 +35,7 @@ def test_corrections_follow_their_region(painted):
 
 
 def test_names_of_targets_are_no_paths_and_differ(painted):
-    names = [painted.add_target("../../etc/passwd.ply", cloud(SIZE, seed=1)) for _ in range(2)]
+    names = [painted.add_target("../../etc/passwd.ply", small_box(seed=1)) for _ in range(2)]
     assert names == ["passwd", "passwd-2"]
     files = sorted(p.name for p in (painted.session.folder / "clouds").iterdir())
     assert files == ["cloud-1.ply", "cloud-2.ply", "cloud-3.ply"]

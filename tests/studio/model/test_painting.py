@@ -60,6 +60,40 @@ def test_the_mirror_image_is_on_the_other_side(chair):
     assert not body.canvas.mirrored(np.zeros(len(left), bool)).any()
 
 
+def test_a_border_moves_by_distances_along_the_surface(chair):
+    body, regions = chair
+    seed = middle(body, regions["seat"])
+    patch, larger = body.canvas.patch(seed, 0.08), body.canvas.patch(seed, 0.12)
+    grown = body.canvas.offset(patch, 0.04)
+    assert (grown & ~patch).any() and (grown & patch == patch).all()
+    assert (grown ^ larger).sum() < 0.2 * larger.sum()
+    assert (body.canvas.offset(grown, -0.04) ^ patch).sum() < 0.2 * patch.sum()
+    none = np.zeros(len(patch), bool)
+    assert not body.canvas.offset(none, 0.01).any() and body.canvas.offset(~none, -0.01).all()
+
+
+def test_holes_are_filled_and_what_is_beside_is_not(chair):
+    body, regions = chair
+    seed = middle(body, regions["seat"])
+    patch = body.canvas.patch(seed, 0.12)
+    with_hole = patch & ~body.canvas.patch(seed, 0.04)
+    assert with_hole.sum() < patch.sum()
+    assert (body.canvas.filled(with_hole) == patch).all()
+    assert (body.canvas.filled(patch) == patch).all()
+
+
+def test_a_ragged_border_becomes_smooth(chair):
+    body, regions = chair
+    seed = middle(body, regions["seat"])
+    patch = body.canvas.patch(seed, 0.12)
+    rim = np.flatnonzero(body.canvas.offset(patch, 0.02) & ~body.canvas.offset(patch, -0.02))
+    ragged = patch.copy()
+    flipped = np.random.default_rng(0).permutation(rim)[: len(rim) // 4]
+    ragged[flipped] ^= True
+    smooth = body.canvas.smoothed(ragged)
+    assert (smooth ^ patch).sum() < 0.6 * (ragged ^ patch).sum()
+
+
 def test_painting_8192_points_takes_less_than_100_ms(chair):
     from nrdf.studio.scene.colours import painted_colours
 

@@ -9,8 +9,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 
-from builders.studio_page import face, silent
-from builders.taught_box import SIZE, cloud
+from builders.studio_page import face, silent, small_box
 from nrdf.io.cloud import write_cloud
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.knowledge_file import read_knowledge
@@ -46,7 +45,7 @@ def test_knowledge_goes_out_and_comes_back(painted, tmp_path):
 
 @pytest.mark.parametrize("name", ["...ply", "..", "/etc/..ply", "con.ply", "C:\\..\\..ply"])
 def test_no_name_of_an_upload_leads_out_of_the_sessions_folder(painted, name):
-    got = painted.add_target(name, cloud(SIZE, seed=1))
+    got = painted.add_target(name, small_box(seed=1))
     assert got not in ("", ".", "..") and "/" not in got and "\\" not in got
     saved = painted.session.folder / "saved"
     assert saved_path(painted, got, "job") == saved / got / "job"
@@ -106,8 +105,8 @@ def full_knowledge():
 def test_nothing_of_a_file_is_lost_when_it_is_opened_edited_and_saved(tmp_path):
     folder = tmp_path / "given"
     folder.mkdir()
-    write_cloud(folder / "box.ply", cloud())
-    np.save(folder / "top.npy", face(cloud(), "top"))
+    write_cloud(folder / "box.ply", small_box())
+    np.save(folder / "top.npy", face(small_box(), "top"))
     (folder / "any.yaml").write_text(json.dumps(full_knowledge()))
     given = read_knowledge(folder / "any.yaml")
     Editor(Session(tmp_path / "s")).open_knowledge("x", read_knowledge_zip("k.zip", zipped(folder)))
@@ -120,6 +119,6 @@ def test_nothing_of_a_file_is_lost_when_it_is_opened_edited_and_saved(tmp_path):
     assert region.processes[1] == before.processes[1]
     ways = {"file", "indices", "processes"}
     assert region.model_dump(exclude=ways) == before.model_dump(exclude=ways)
-    assert region.indices == np.flatnonzero(face(cloud(), "top")).tolist()
+    assert region.indices == np.flatnonzero(face(small_box(), "top")).tolist()
     ways = {"reference", "regions"}
     assert saved.model_dump(exclude=ways) == given.model_dump(exclude=ways)

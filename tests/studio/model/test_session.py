@@ -7,8 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from builders.studio_page import face
-from builders.taught_box import SIZE, cloud
+from builders.studio_page import face, small_box
 from nrdf.errors import OutputError
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session import Session
@@ -23,12 +22,12 @@ def again(editor):
 def test_everything_is_there_after_a_crash(painted):
     painted.recolour_region("top", (1, 2, 3))
     painted.change_numbers("top", 0, {"stepover_mm": 12.0, "force_n": 0.0})
-    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    painted.add_target("other.ply", small_box(seed=1))
     mask = face(painted.paintable("other").cloud, "front")
     painted.paint("other", "top", mask)
     kept = again(painted).document
     assert kept.category == "chair" and kept.reference.name == "box.ply"
-    np.testing.assert_allclose(kept.reference.cloud.points, cloud().points)
+    np.testing.assert_allclose(kept.reference.cloud.points, small_box().points)
     (region,) = kept.regions
     assert (region.mask == painted.document.regions[0].mask).all() and region.colour == (1, 2, 3)
     assert region.steps[0]["stepover_m"] == pytest.approx(0.012)
@@ -50,7 +49,7 @@ def test_undo_and_redo_also_on_disk(painted):
 
 
 def test_clouds_that_nothing_needs_any_more_go_when_it_starts_again(painted):
-    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    painted.add_target("other.ply", small_box(seed=1))
     painted.remove_target("other")
     assert painted.session.undo() and len(list((painted.session.folder / "clouds").iterdir())) == 2
     painted.session.redo()

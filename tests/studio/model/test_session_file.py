@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from builders.taught_box import SIZE, cloud
+from builders.studio_page import small_box
 from nrdf.errors import OutputError, ProcessError
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.session_file import FILE
@@ -37,7 +37,7 @@ def again(editor):
     ],
 )
 def test_a_session_that_is_damaged_is_kept_aside_whole(painted, change, message):
-    painted.add_target("other.ply", cloud(SIZE, seed=1))
+    painted.add_target("other.ply", small_box(seed=1))
     folder = painted.session.folder
     path = folder / FILE
     path.write_text(json.dumps(change(json.loads(path.read_text()))))

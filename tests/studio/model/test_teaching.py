@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builders.taught_box import cloud
+from builders.studio_page import small_box
 from nrdf.errors import ProcessError
 from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.session import Session
@@ -48,7 +48,7 @@ def test_knowledge_needs_a_reference_and_a_region(tmp_path):
     editor = Editor(Session(tmp_path / "session"))
     with pytest.raises(ProcessError, match="step 1"):
         bound_knowledge_of(editor.session.clouds, editor.document)
-    editor.open_reference("box.ply", cloud(), "chair")
+    editor.open_reference("box.ply", small_box(), "chair")
     editor.add_region()
     with pytest.raises(ProcessError, match="step 2"):
         bound_knowledge_of(editor.session.clouds, editor.document)

@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from builders.taught_box import cloud
+from builders.studio_page import small_box
 from nrdf.errors import CloudError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.studio.model import uploads
@@ -23,13 +23,14 @@ from nrdf.studio.model.uploads import (
 
 @pytest.fixture
 def content(tmp_path):
-    write_cloud(tmp_path / "box.ply", PointCloud(1000 * cloud().points, cloud().normals, "mm"))
+    box = small_box()
+    write_cloud(tmp_path / "box.ply", PointCloud(1000 * box.points, box.normals, "mm"))
     return (tmp_path / "box.ply").read_bytes()
 
 
 def test_a_cloud_comes_in_metres(content):
     read = read_upload("box.ply", content, "chair")
-    np.testing.assert_allclose(read.points, cloud().points)
+    np.testing.assert_allclose(read.points, small_box().points)
     assert read.unit == "m"
 
 
@@ -61,7 +62,7 @@ def test_the_readers_errors_name_the_file_as_it_was_sent(content):
 
 
 def test_a_unit_that_nothing_tells_is_asked_for(tmp_path):
-    write_cloud(tmp_path / "box.ply", PointCloud(7 * cloud().points))
+    write_cloud(tmp_path / "box.ply", PointCloud(7 * small_box().points))
     content = (tmp_path / "box.ply").read_bytes()
     with pytest.raises(ProcessError, match=r"box\.ply does not say its unit"):
         read_upload("box.ply", content, "chair")

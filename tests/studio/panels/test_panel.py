@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from builders.studio_page import face
-from builders.taught_box import cloud
+from builders.studio_page import face, small_box
 from nrdf.studio.model.document import REFERENCE
 
 
@@ -31,14 +30,14 @@ def test_another_region_is_selected_with_its_first_step(page):
     studio.step = 3
     page.does(panel._select_region, "front")
     assert (studio.region, studio.step) == ("front", 0) and panel.region.value == "front"
-    page.does(panel._select_tool, "Brush")
+    page.does(panel.take, "Brush")
     assert page.studio.mouse.tool == "Brush" and "**Brush**" in panel.hint.content
 
 
 def test_undo_takes_the_last_change_back(page):
-    page.editor.paint(REFERENCE, "top", face(cloud(), "front"))
+    page.editor.paint(REFERENCE, "top", face(small_box(), "front"))
     page.does(page.studio.panel.regions.undo)
-    assert (page.editor.document.region("top").mask == face(cloud(), "top")).all()
+    assert (page.editor.document.region("top").mask == face(small_box(), "top")).all()
     page.does(page.studio.panel.regions.redo)
-    assert (page.editor.document.region("top").mask == face(cloud(), "front")).all()
+    assert (page.editor.document.region("top").mask == face(small_box(), "front")).all()
     assert "nothing to redo" in page.does(page.studio.panel.regions.redo)

@@ -40,6 +40,9 @@ def test_steps_are_added_selected_and_removed(page):
 def test_the_body_of_the_tool_and_what_the_page_has_no_field_for(page):
     tab, editor = page.studio.panel.process, page.editor
     tool = {"name": "gun", "radius_m": 0.03, "body_length_m": 0.3, "pad": {"preston_per_pa": 1e-9}}
+    top = editor.document.region("top").mask
+    page.paint("top", [])  # without points nothing is planned
+    page.paint("front", [])
     wanted = {"value": 60.0, "tolerance": 10.0}
     editor.change_step("top", 0, tool=tool, removal_um=wanted, order=3)
     page.does(tab.refresh)
@@ -52,6 +55,7 @@ def test_the_body_of_the_tool_and_what_the_page_has_no_field_for(page):
     step = editor.document.region("top").steps[0]
     assert step["tool"] == {**tool, "body_radius_m": 0.045, "clearance_m": 0.0}
     assert step["removal_um"] == wanted and step["order"] == 3
+    page.paint("top", top)
     tab.body["body_length_m"].value = 0.0
     page.does(tab._set_tool)
     assert "body_radius_m needs body_length_m" in page.change(feed_mm_s=100.0)

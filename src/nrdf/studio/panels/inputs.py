@@ -39,13 +39,22 @@ class Inputs:
 
         # Async: on the event loop, at once, before anything can set the input to another value.
         async def answer(event: Any) -> None:
-            if event.client is None:
+            if event.client is None or event.client.client_id in self.context.read_only:
                 return
             panel_event = PanelEvent(event.client, getattr(event.target, "value", None))
             self._pending[id(event.target)] += 1
             self._executor.submit(self._answer, act, panel_event, id(event.target))
 
         register(answer)
+
+    def soon(self, act: Callable[[], None]) -> None:
+        """Call `act` after all clicks and changes that came before."""
+
+        def answer() -> None:
+            with self.context.reporting_errors():
+                act()
+
+        self._executor.submit(answer)
 
     def set_value(self, handle: Any, value: Any) -> None:
         """Show a value in an input, unless a person has just set it to another."""

@@ -1,4 +1,4 @@
-"""The panel beside the objects: the next step, the mouse tool, and six numbered tabs."""
+"""The panel beside the objects: the next step, the region, and six numbered tabs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Literal, Protocol
 
 from nrdf.studio.arm_simulation import ArmSimulation
 from nrdf.studio.context import StudioContext
-from nrdf.studio.mouse import KEYS, TOOLS, Mouse
+from nrdf.studio.mouse import Mouse
+from nrdf.studio.overlay import Overlay
 from nrdf.studio.panels.inputs import Inputs, PanelEvent, ProgressBar
 from nrdf.studio.panels.process import ProcessTab
 from nrdf.studio.panels.reference import ReferenceTab
@@ -17,20 +18,9 @@ from nrdf.studio.panels.robot import RobotTab
 from nrdf.studio.panels.save import SaveTab
 from nrdf.studio.panels.standing import unconfirmed
 from nrdf.studio.panels.targets import TargetsTab
+from nrdf.studio.tools import ACTS, ERASE, TOOLS, tool
 
 NO_REGION = "(none yet)"
-_IN_A_ROW = 4
-_HINTS = {
-    "Orbit": "Drag to orbit, use the wheel to zoom, drag with the right button to pan.",
-    "Grow": "Click the surface: a patch grows from there. Its **radius** is in step 2.",
-    "Brush": "Drag over the surface to paint; drag beside the object to orbit.",
-    "Box": "Drag a rectangle over the points; take Orbit to orbit again.",
-    "Direction": "Drag on the reference along the direction of the tool path's lines.",
-    "Similarity": "Click the reference, or move over it with the button held: points with similar "
-    "descriptors are coloured on every object. How similar: a slider in step 4.",
-    "Measure": "Click a point: its regions, confidence and place, in the object's own frame. Click "
-    "another one: how far it is from the first.",
-}
 
 
 class Tab(Protocol):
@@ -62,11 +52,6 @@ class Panel:
         self.error = gui.add_markdown("", visible=False)
         self.working = ProgressBar(gui, cancel)
         self.simulating = ProgressBar(gui, lambda: simulation.worker.cancel())
-        rows = TOOLS[:_IN_A_ROW], TOOLS[_IN_A_ROW:]
-        self.tools = [
-            gui.add_button_group(name, [f"{tool} · {KEYS[tool]}" for tool in row])
-            for name, row in zip(("Mouse tool", " "), rows, strict=True)
-        ]
         self.hint = gui.add_markdown("")
         self.region = gui.add_dropdown(
             "Region", (NO_REGION,), hint="The region that is painted and described now."
@@ -87,11 +72,10 @@ class Panel:
         self._tabs: tuple[Tab, ...] = (
             self.reference, self.regions, self.process, self.targets, self.save, self.robot,
         )  # fmt: skip
-        for buttons in self.tools:
-            inputs.on(buttons.on_click, lambda event: self._select_tool(event.value.split(" ")[0]))
-        for tool, key in KEYS.items():
-            command = gui.add_command(f"Mouse tool: {tool}", hotkey=key)
-            inputs.on(command.on_trigger, partial(self._take, tool))
+        for each in (*TOOLS, ERASE, *ACTS):
+            command = gui.add_command(each.name, hotkey=each.key)
+            inputs.on(command.on_trigger, partial(self._take, each.name))
+        self.overlay = Overlay(context, mouse, inputs, self)
         inputs.on(self.region.on_update, lambda event: self._select_region(event.value))
         keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[PanelEvent], None]], ...] = (
             ("Undo", "Z", self.regions.undo), ("Redo", "Y", self.regions.redo),
@@ -108,8 +92,11 @@ class Panel:
             self.inputs.set_options(self.region, tuple(names) or (NO_REGION,))
             self.inputs.set_value(self.region, context.region or NO_REGION)
             self.next.content = f"**Next:** {next_step(context)}"
-            tool = self.mouse.tool
-            self.hint.content = f"Mouse tool **{tool}**: {self.mouse.measured or _HINTS[tool]}"
+            held = tool(self.mouse.tool)
+            said = self.mouse.measured or held.hint
+            erases = " It takes away." if self.mouse.erase else ""
+            self.hint.content = f"Mouse tool **{held.name}**: {said}{erases}"
+            self.overlay.refresh()
             for tab in self._tabs:
                 tab.refresh()
 
@@ -119,11 +106,15 @@ class Panel:
             self.error.content = text
             self.error.visible = bool(text)
 
-    def _take(self, tool: str, _: PanelEvent) -> None:
-        self._select_tool(tool)
+    def _take(self, name: str, _: PanelEvent) -> None:
+        self.take(name)
 
-    def _select_tool(self, tool: str) -> None:
-        self.mouse.select_tool(tool)
+    def take(self, name: str) -> None:
+        """Take a tool, or do one of the acts."""
+        if any(name == each.name for each in TOOLS):
+            self.mouse.select_tool(name)
+        else:
+            self.mouse.act(name)
         self.refresh()
 
     def _select_region(self, name: str) -> None:

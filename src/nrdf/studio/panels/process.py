@@ -51,6 +51,7 @@ class ProcessTab:
         gui = context.server.gui
         gui.add_markdown("Describe the process of the region; its tool path is drawn at once.")
         self.status = gui.add_markdown("")
+        self.plan = gui.add_button("Plan the tool paths", color="green", visible=False)
         self.kind = gui.add_dropdown("Process", KINDS, hint="Choosing one fills in usual values.")
         self.pattern = gui.add_dropdown("Pattern", PATTERNS)
         self.numbers = {name: self._number(name) for name in _MAIN[0]}
@@ -77,6 +78,7 @@ class ProcessTab:
             self.steps = gui.add_button_group("Steps", ("Add", "Remove"))
         for name, handle in self.numbers.items():
             inputs.on(handle.on_update, partial(self._set_number, name))
+        inputs.on(self.plan.on_click, lambda _: self._plan_now())
         inputs.on(self.kind.on_update, lambda event: self._set_kind(event.value))
         inputs.on(self.pattern.on_update, lambda event: self._change(trajectory=event.value))
         inputs.on(self.longest.on_click, lambda _: self._change(direction=None))
@@ -94,6 +96,7 @@ class ProcessTab:
         region = context.editor.document.region(context.region)
         if region is None:
             self.status.content = "Paint a region in step 2 first."
+            self.plan.visible = False
             return
         step = region.steps[context.step]
         inputs.set_value(self.kind, str(step["kind"]))
@@ -119,6 +122,7 @@ class ProcessTab:
             else f"Lines run along ({', '.join(f'{x:.2f}' for x in direction)}): the arrow."
         )
         self.status.content = "  \n".join([self._plan(region), *kept_as_it_is(step)])
+        self.plan.visible = bool(region.mask.any()) and "Not planned" in self.status.content
 
     def _plan(self, region: PaintedRegion) -> str:
         """The metrics of the plan, in Markdown, or why there is none."""
@@ -126,7 +130,8 @@ class ProcessTab:
             return f"**{region.name}** has no points yet."
         plan = self.context.results.plan(region, self.context.step)
         if plan is None:
-            return "*planning …*"
+            planning = self.context.worker.has_job("plan")
+            return "*planning …*" if planning else "Not planned yet."
         if plan.fault or plan.checked is None or plan.checked.metrics is None:
             return f"⚠ {_labelled(plan.fault)}"
         metrics = plan.checked.metrics
@@ -193,9 +198,11 @@ class ProcessTab:
             context.step = max(context.step - 1, 0)
         self._changed()
 
+    def _plan_now(self) -> None:
+        self.context.plan(0.0)
+
     def _changed(self) -> None:
         self.context.draw()
-        self.context.refresh_panel()
         self.context.plan()
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from nrdf.errors import RegionError
 from nrdf.studio.context import StudioContext
 from nrdf.studio.model.document import REFERENCE
-from nrdf.studio.mouse import TOOLS, Mouse
+from nrdf.studio.mouse import Mouse
 from nrdf.studio.panels.inputs import Inputs
+from nrdf.studio.tools import TOOLS
 
 
 class RegionsTab:
@@ -27,9 +28,8 @@ class RegionsTab:
             "Radius, mm", 5, 500, 1, 50,
             hint="Along the surface. It also changes the patch that was grown last.",
         )  # fmt: skip
-        self.erase = gui.add_checkbox("Erase instead of paint", False)
         self.through = gui.add_checkbox(
-            "Box takes hidden points too", False, hint="Otherwise only points that you see."
+            "Rectangle takes hidden points too", False, hint="Otherwise only points that you see."
         )
         self.status = gui.add_markdown("")
         self.history = gui.add_button_group("History", ("Undo", "Redo"))
@@ -39,8 +39,7 @@ class RegionsTab:
         inputs.on(self.name.on_update, lambda event: self._rename(event.value))
         inputs.on(self.colour.on_update, lambda event: self._recolour(event.value))
         inputs.on(self.radius.on_update, lambda event: mouse.set_radius(1e-3 * event.value))
-        inputs.on(self.erase.on_update, lambda event: self._set(erase=event.value))
-        inputs.on(self.through.on_update, lambda event: self._set(through=event.value))
+        inputs.on(self.through.on_update, lambda event: setattr(mouse, "through", event.value))
         inputs.on(self.history.on_click, lambda event: self._history(event.value))
         inputs.on(self.more.on_click, lambda event: self._more(event.value))
         inputs.on(self.overlap.on_update, lambda event: self._overlap(event.value))
@@ -83,7 +82,7 @@ class RegionsTab:
         if context.editor.document.reference is None:
             raise RegionError("there is no object to paint on: open one in step 1")
         context.region, context.step = context.editor.add_region(), 0
-        if self.mouse.tool == TOOLS[0]:
+        if self.mouse.tool == TOOLS[0].name:
             self.mouse.select_tool("Grow")
         context.sync()
 
@@ -101,10 +100,6 @@ class RegionsTab:
         self.context.need_region()
         self.context.editor.recolour_region(self.context.region, colour)
         self.context.draw()
-
-    def _set(self, **choices: bool) -> None:
-        for name, value in choices.items():
-            setattr(self.mouse, name, value)
 
     def _overlap(self, allowed: bool) -> None:
         self.context.editor.allow_overlap(allowed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.path import Path
 from scipy.spatial.transform import Rotation
 
 _HIDDEN = 2.5
@@ -91,6 +92,15 @@ def points_in_rectangle(
     low, high = np.minimum(*corners), np.maximum(*corners)
     chosen = (depth > 0) & (screen >= low).all(axis=1) & (screen <= high).all(axis=1)
     return chosen if through else chosen & visible_points(camera, points, normals, spacing)
+
+
+def points_in_outline(
+    camera: Camera, points: np.ndarray, normals: np.ndarray, outline: np.ndarray, spacing: float
+) -> np.ndarray:
+    """Which points (n,) are seen within an outline (m, 2) on the screen, as a lasso draws it."""
+    screen, depth = camera.project(points)
+    inside = (depth > 0) & Path(outline).contains_points(screen)
+    return inside & visible_points(camera, points, normals, spacing)
 
 
 def visible_points(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from nrdf.studio.model.document import PaintedRegion
 from nrdf.viz.palette import NO_REGION, SEVERAL_REGIONS, confidence_scale, similarity_scale
 
 COLOURINGS = ("regions", "confidence", "similarity")
@@ -46,3 +47,18 @@ def similarity_colours(distance: np.ndarray, width: float) -> np.ndarray:
     distance: (n,) descriptor distances; width: the distance at which the similarity is 1/e.
     """
     return similarity_scale(np.exp(-((distance / max(width, 1e-6)) ** 2)))
+
+
+def legend_of(colouring: str, regions: Sequence[PaintedRegion]) -> list[tuple[str, str]]:
+    """What the colours of objects mean: (words, colour in hexadecimal) each."""
+    if colouring == "regions":
+        several = [("in several regions", _hexadecimal(np.array(SEVERAL_REGIONS)))]
+        own = [(region.name, _hexadecimal(np.array(region.colour))) for region in regions]
+        return own + (several if len(regions) > 1 else [])
+    scale = confidence_scale if colouring == "confidence" else similarity_scale
+    words = {1.0: f"{colouring} 1", 0.5: "0.5", 0.0: "0"}
+    return [(w, _hexadecimal(scale(np.array([v]))[0])) for v, w in words.items()]
+
+
+def _hexadecimal(colour: np.ndarray) -> str:
+    return "#" + "".join(f"{int(value):02x}" for value in colour)

@@ -1,0 +1,120 @@
+"""What lies over the objects in the browser: tools, legends, thumbnails, time line, and the cursor.
+
+`page/overlay.js` draws it. What to draw stands in an element of the panel; what a person does there
+comes as a request.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import viser
+
+from nrdf.studio.context import StudioContext
+from nrdf.studio.mouse import Mouse, camera_of
+from nrdf.studio.scene.colours import legend_of
+from nrdf.studio.serving import StudioServer
+from nrdf.studio.tools import ACTS, ERASE, TOOLS
+
+if TYPE_CHECKING:
+    from nrdf.studio.panels.inputs import Inputs
+
+_MOST_CORNERS = 400
+_STATE = '<div data-nrdf-state="{}" hidden></div>'
+_CLIENT = '<div data-nrdf-client="{}" hidden></div>'
+
+
+class Takes(Protocol):
+    """Takes tools."""
+
+    def take(self, name: str) -> None:
+        """Take a tool, or do one of the acts."""
+
+
+class Overlay:
+    """panel: what buttons and keys do."""
+
+    def __init__(
+        self, context: StudioContext, mouse: Mouse, inputs: Inputs, panel: Takes
+    ) -> None:  # fmt: skip
+        self.context, self.mouse, self._inputs, self._panel = context, mouse, inputs, panel
+        self._state = context.server.gui.add_html("")
+        context.server.on_client_connect(self._welcome)
+        context.server.on_client_disconnect(lambda c: context.read_only.discard(c.client_id))
+        if isinstance(context.server, StudioServer):
+            context.server.page.answers |= {
+                "tool": self._act, "act": self._act, "hover": self._hover, "lasso": self._lasso,
+                "read_only": self._look_only,
+            }  # fmt: skip
+
+    def refresh(self) -> None:
+        """Show what the studio has now."""
+        text = _STATE.format(html.escape(json.dumps(self.content()), quote=True))
+        if self._state.content != text:
+            self._state.content = text
+
+    def content(self) -> dict[str, Any]:
+        """What is shown, as `page/overlay.js` takes it."""
+        context = self.context
+        return {
+            "tool": self.mouse.tool,
+            "tools": [[each.name, each.key, _plain(each.hint)] for each in TOOLS],
+            "erase": self.mouse.erase,
+            "erase_key": ERASE.key,
+            "acts": [[each.name, each.key, each.hint] for each in ACTS],
+            "legend": legend_of(context.colouring, context.editor.document.regions),
+            "targets": [],
+            "preview": "",
+            "line": [],
+        }
+
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        client.gui.add_html(_CLIENT.format(client.client_id))
+
+    def _act(self, values: Mapping[str, str]) -> dict[str, object]:
+        name = values["name"]
+        return self._soon(values, lambda _: self._panel.take(name))
+
+    def _lasso(self, values: Mapping[str, str]) -> dict[str, object]:
+        corners = [part.split(",") for part in values["points"].split(";")]
+        outline = np.array(corners[:_MOST_CORNERS], np.float64)
+        if outline.ndim != 2 or outline.shape[1] != 2 or not np.isfinite(outline).all():
+            raise ValueError("an outline has x and y for each point")
+        if len(outline) < 3:
+            return {}
+        return self._soon(values, lambda client: self.mouse.select_outline(client, outline))
+
+    def _hover(self, values: Mapping[str, str]) -> dict[str, object]:
+        screen = float(values["x"]), float(values["y"])
+        camera = camera_of(self._client(values))
+        # Not at all rather than late: the server has other things to do.
+        if not self.context.lock.acquire(timeout=0.01):
+            return {}
+        try:
+            return {"text": _plain(self.mouse.under(camera, screen)).replace(", x", "\nx")}
+        finally:
+            self.context.lock.release()
+
+    def _look_only(self, values: Mapping[str, str]) -> dict[str, object]:
+        self.context.read_only.add(self._client(values).client_id)
+        return {}
+
+    def _soon(
+        self, values: Mapping[str, str], act: Callable[[viser.ClientHandle], None]
+    ) -> dict[str, object]:
+        client = self._client(values)
+        if client.client_id not in self.context.read_only:
+            self._inputs.soon(lambda: act(client))
+        return {}
+
+    def _client(self, values: Mapping[str, str]) -> viser.ClientHandle:
+        """The browser that asks. Raises KeyError for one that has gone."""
+        return self.context.server.get_clients()[int(values["client"])]
+
+
+def _plain(markdown: str) -> str:
+    return markdown.replace("**", "")
