@@ -13,6 +13,7 @@ from nrdf.geometry.sampling import (
     downsample,
     fibonacci_directions,
     indices_in_subset,
+    spread_in_triangles,
 )
 
 
@@ -80,3 +81,13 @@ def test_indices_become_positions_in_a_subset():
     subset = np.array([1, 4, 6, 8])
     assert indices_in_subset(subset, np.array([8, 4, 5, 4]), 10).tolist() == [1, 3]
     assert indices_in_subset(subset, np.array([], int), 10).tolist() == []
+
+
+def test_places_lie_in_their_triangles_and_fill_them_evenly():
+    triangle = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
+    places = spread_in_triangles(np.tile(triangle, (1000, 1, 1)))
+    assert (places[:, :2] >= 0.0).all() and (places.sum(axis=1) <= 1.0).all()
+    for axis in range(2):  # the quarter of the area in each of these corners
+        assert abs((places[:, axis] > 0.5).mean() - 0.25) < 0.01
+    assert abs((places.sum(axis=1) < 0.5).mean() - 0.25) < 0.01
+    np.testing.assert_allclose(places.mean(axis=0), [1 / 3, 1 / 3, 0], atol=0.005)

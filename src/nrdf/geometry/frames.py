@@ -11,8 +11,15 @@ from scipy.spatial.transform import Rotation
 
 def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., 3) brought to unit length; zero stays zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors) / np.maximum(length, 1e-12)
+    vectors = np.asarray(vectors)
+    length = np.sqrt(np.einsum("...a,...a->...", vectors, vectors))  # several times as fast as norm
+    return vectors / np.maximum(length, 1e-12)[..., None]
+
+
+SIDES = unit_vectors(
+    np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
+)
+"""Directions (26, 3) all around; none is farther than 28° from one of them."""
 
 
 def angles_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Fewer points of a cloud, spread evenly, and directions spread evenly over the sphere."""
+"""Fewer points of a cloud, spread evenly; directions and places on triangles, spread evenly."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from nrdf.geometry.canonical import bounding_box
 _LARGEST_GRID = 1 << 25  # cells of a dense voxel grid, 128 MiB of indices
 _CHUNK = 1 << 18  # points handled at a time
 _SAME_PLACE = 1e-7  # in shares of the longest side: points nearer than that are in one place
+
+_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the plane (Roberts, 2018)
 
 
 def downsample(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -107,3 +109,12 @@ def fibonacci_directions(count: int) -> np.ndarray:
     radius = np.sqrt(1.0 - z * z)
     angle = np.pi * (1.0 + 5.0**0.5) * index
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+
+
+def spread_in_triangles(corners: np.ndarray) -> np.ndarray:
+    """A place (n, 3) in each of triangles (n, 3, 3); those in the same one lie evenly in it."""
+    one, other = (np.outer(np.arange(1, len(corners) + 1), _GOLDEN) % 1.0).T[..., None]
+    folded = one + other > 1.0  # at the diagonal of the parallelogram
+    one, other = np.where(folded, 1.0 - one, one), np.where(folded, 1.0 - other, other)
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    return np.asarray(a + one * (b - a) + other * (c - a))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from threading import RLock
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from nrdf.errors import ProcessError
 from nrdf.surface.mesh_edges import boundary_loops, edge_components
 from nrdf.surface.region_border import LEVEL, Votes, cut_at_borders
 from nrdf.surface.region_pieces import Pieces
+from nrdf.surface.smooth_normals import SmoothNormals
 from nrdf.surface.target_mesh import TargetMesh
 
 _WORTH = 0.1  # footprints, an area that is worth a word
@@ -25,6 +28,12 @@ class RegionMesh:
     mesh: TargetMesh
     parent: TargetMesh
     changes: tuple[str, ...] = ()
+    _felt: dict[float, SmoothNormals] = field(default_factory=dict, repr=False)
+    _lock: Any = field(default_factory=RLock, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes, as of `TargetMesh`."""
+        return RegionMesh, (self.mesh, self.parent, self.changes)
 
     @staticmethod
     def from_faces(target: TargetMesh, face_mask: np.ndarray) -> RegionMesh:
@@ -57,6 +66,20 @@ class RegionMesh:
         """Length, m, of a closed loop of vertex indices (n,)."""
         places = self.mesh.vertices[loop]
         return float(np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1).sum())
+
+    def felt_normals(self, points: np.ndarray, faces: np.ndarray, radius_m: float) -> np.ndarray:
+        """`TargetMesh.smooth_normals` of the whole object at points (m, 3), m, on its `faces` (m,);
+        around the region without a look at the rest."""
+        with self._lock:
+            if radius_m not in self._felt:
+                near = self.mesh.vertices, self.mesh.faces
+                around = self.parent.vertices, self.parent.faces
+                self._felt[radius_m] = SmoothNormals(*around, radius_m, near)
+        felt, points = self._felt[radius_m], np.asarray(points)
+        known = felt.known(points)
+        if not known.all():
+            return self.parent.smooth_normals(points, faces, radius_m)
+        return felt(points, self.parent.face_normals[faces])
 
     def components(self) -> list[RegionMesh]:
         """The parts that no edge connects, the largest first."""

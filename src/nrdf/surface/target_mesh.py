@@ -9,24 +9,16 @@ from typing import Any
 
 import igl
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError, ProcessError
-from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.frames import SIDES, unit_vectors
 from nrdf.geometry.mesh import Mesh, triangle_crosses
 from nrdf.geometry.winding import MeshWindingNumber
 from nrdf.surface.mesh_edges import opposite_half_edges
 from nrdf.surface.mesh_repair import repaired_skin
+from nrdf.surface.smooth_normals import SmoothNormals
 
 _FACING = 0.5  # least cosine between a face's normal and the side asked for
-_MOST_SAMPLES = 200_000  # patches of area that smooth normals are averaged from
-_ROUNDS, _SETTLED = 8, 1e-3  # of an average that finds the side it faces, and its last turn, rad
-_PER_RADIUS, _NEIGHBOURS = 2.5, 48  # patches along a tool's radius, and under the whole tool
-_AT_ONCE = 1 << 15
-_SIDES = unit_vectors(
-    np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z])
-)
-"""Directions (26, 3); none is farther than 28° from one of them."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +115,7 @@ class TargetMesh:
             outward = unit_vectors(np.asarray(outward, dtype=np.float64))
             facing = np.einsum("ma,ma->m", self.face_normals[faces], outward)
             other = np.flatnonzero(facing < _FACING)
-            side = (outward[other] @ _SIDES.T).argmax(axis=1)
+            side = (outward[other] @ SIDES.T).argmax(axis=1)
             for number in np.unique(side):
                 asked = other[side == number]
                 found = self._nearest_of_side(points[asked], int(number))
@@ -135,7 +127,7 @@ class TargetMesh:
         self, points: np.ndarray, side: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Squared distances (m,), faces (m,) and places (m, 3) on the faces that look to one of
-        `_SIDES`, or on all for -1."""
+        `SIDES`, or on all for -1."""
         with self._lock:
             if side not in self._found:
                 self._found[side] = self._tree_of_side(side)
@@ -146,7 +138,7 @@ class TargetMesh:
     def _tree_of_side(self, side: int) -> tuple[igl.AABB, np.ndarray, np.ndarray]:
         chosen = np.arange(len(self.faces))
         if side >= 0:
-            facing = self.face_normals @ _SIDES[side] > _FACING
+            facing = self.face_normals @ SIDES[side] > _FACING
             chosen = np.flatnonzero(facing) if facing.any() else chosen
         faces = np.ascontiguousarray(self.faces[chosen])
         tree = igl.AABB()
@@ -181,88 +173,13 @@ class TargetMesh:
         The average over the area within `radius_m` whose normals turn less than 60° from the
         average itself, which is found from the face's own normal.
         """
-        points = np.asarray(points, dtype=np.float64)
-        normals = np.array(self.face_normals[faces], dtype=np.float64)
-        for start in range(0, len(points), _AT_ONCE):
-            part = slice(start, start + _AT_ONCE)
-            normals[part] = self._smooth_at_once(points[part], normals[part], radius_m)
-        return normals
-
-    def _smooth_at_once(
-        self, points: np.ndarray, normals: np.ndarray, radius_m: float
-    ) -> np.ndarray:
-        tree, weighted, directions = self._patches(radius_m)
-        away, near = tree.query(
-            points, min(_NEIGHBOURS, tree.n), distance_upper_bound=1.5 * radius_m
-        )
-        there = np.isfinite(away)
-        near = np.where(there, near, 0)
-        weight = np.maximum(1.0 - (away / (1.5 * radius_m)) ** 2, 0.0) ** 2 * there
-        turning = np.arange(len(points))
-        for _ in range(_ROUNDS):
-            facing = np.einsum("mka,ma->mk", directions[near[turning]], normals[turning])
-            share = weight[turning] * np.maximum(facing - _FACING, 0.0)
-            mean = np.einsum("mk,mka->ma", share, weighted[near[turning]])
-            found = np.where(mean.any(axis=1)[:, None], unit_vectors(mean), normals[turning])
-            turned = np.linalg.norm(found - normals[turning], axis=1) > _SETTLED
-            normals[turning] = found
-            turning = turning[turned]
-            if not len(turning):
-                break
-        return normals
-
-    def _patches(self, radius_m: float) -> tuple[cKDTree, np.ndarray, np.ndarray]:
-        """Middles of patches of a fraction of the tool's size; normals (p, 3) times area, and unit
-        normals (p, 3)."""
-        size = max(radius_m / _PER_RADIUS, float(np.sqrt(self.face_areas.sum() / _MOST_SAMPLES)))
-        key = ("patches", size)
+        key = ("felt", radius_m)
         with self._lock:
             if key not in self._found:
-                self._found[key] = self._patches_of_size(size)
-        found: tuple[cKDTree, np.ndarray, np.ndarray] = self._found[key]
-        return found
-
-    def _patches_of_size(self, size: float) -> tuple[cKDTree, np.ndarray, np.ndarray]:
-        middles, face, areas = _split_to_size(self.vertices[self.faces], size)
-        real = areas > 0.0  # needles have no side, and no middle that their area could weigh
-        middles, face, areas = middles[real], face[real], areas[real]
-        normals = self.face_normals[face]
-        # One patch for each cell and side that the normals look to.
-        cell = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64)
-        side = (normals @ _SIDES.T).argmax(axis=1)
-        # One number for each is sorted much faster than rows of four.
-        count = cell.max(axis=0) + 1
-        key_of = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES)
-        _, number = np.unique(key_of + side, return_inverse=True)
-        number = number.reshape(-1)
-        total = np.bincount(number, areas)
-        centre = [np.bincount(number, areas * middles[:, a]) / total for a in range(3)]
-        weighted = [np.bincount(number, areas * normals[:, a]) for a in range(3)]
-        sums = np.stack(weighted, axis=1)
-        return cKDTree(np.stack(centre, axis=1)), sums, unit_vectors(sums)
+                self._found[key] = SmoothNormals(self.vertices, self.faces, radius_m)
+        return np.asarray(self._found[key](np.asarray(points), self.face_normals[faces]))
 
     def submesh(self, face_mask: np.ndarray) -> TargetMesh:
         """The faces of a mask (f,) with the vertices that they use."""
         used, faces = np.unique(self.faces[face_mask], return_inverse=True)
         return TargetMesh(self.vertices[used], faces.reshape(-1, 3), self.repairs)
-
-
-def _split_to_size(corners: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middles (p, 3) of the parts of triangles (f, 3, 3), halved at their longest edge until no
-    edge is longer than `size`; the triangle (p,) that each belongs to; their areas (p,)."""
-    whole = np.arange(len(corners))
-    parts: list[tuple[np.ndarray, np.ndarray]] = []
-    while len(corners):
-        edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-        longest = edges.argmax(axis=1)
-        small = edges.max(axis=1) <= size
-        parts.append((corners[small], whole[small]))
-        corners, whole, longest = corners[~small], whole[~small], longest[~small]
-        row = np.arange(len(corners))
-        a, b = corners[row, longest], corners[row, (longest + 1) % 3]
-        c, middle = corners[row, (longest + 2) % 3], (a + b) / 2.0
-        corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
-        whole = np.concatenate([whole, whole])
-    corners, whole = (np.concatenate(kind) for kind in zip(*parts, strict=True))
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return corners.mean(axis=1), whole, np.linalg.norm(cross, axis=1) / 2.0

@@ -190,7 +190,7 @@ def _projection(region: RegionMesh, strategy: Strategy) -> Project:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         found = region.mesh.nearest(points, normals)
         faces = region.parent.nearest(found.points, found.normals).faces
-        smooth = region.parent.smooth_normals(found.points, faces, strategy.tool_radius_m)
+        smooth = region.felt_normals(found.points, faces, strategy.tool_radius_m)
         return found.points, smooth, found.distances < strategy.tool_radius_m
 
     return project

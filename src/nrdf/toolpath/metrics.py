@@ -195,7 +195,7 @@ def _fit(
     held = Rotation.from_quat(np.concatenate([work[k].quaternions_xyzw[run] for k, run in runs]))
     tails = -(held * tilt.inv()).as_matrix()[:, :, 2]
     nearest = region.parent.nearest(np.concatenate(lines), tails)
-    smooth = region.parent.smooth_normals(nearest.points, nearest.faces, strategy.tool_radius_m)
+    smooth = region.felt_normals(nearest.points, nearest.faces, strategy.tool_radius_m)
     planned = []
     cuts = np.cumsum([len(line) for line in lines])[:-1]
     for line, normals in zip(lines, np.split(smooth, cuts), strict=True):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import ProcessError
+from nrdf.geometry.sampling import spread_in_triangles
 from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
@@ -18,7 +19,6 @@ from nrdf.toolpath.strategy import Strategy
 _PER_RADIUS = 4.0  # samples along the tool's radius
 _FEWEST, _MOST = 400, 20_000
 _SAME = 1e-5  # of an object's size: points that near to its mesh are on it
-_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the plane (Roberts, 2018)
 _FINE = 3.0  # edges along the margin
 
 NO_CLEARANCE, MARGIN = "no_clearance", "edge_margin"
@@ -114,15 +114,9 @@ def sample_evenly(mesh: TargetMesh, spacing_m: float) -> tuple[np.ndarray, np.nd
     if not len(share) or not share[-1] > 0.0:
         raise ProcessError("a region without area cannot be sampled")
     count = int(np.clip(np.ceil(share[-1] / spacing_m**2), _FEWEST, _MOST))
-    number = np.arange(count)
-    at = (number + 0.5) / count * share[-1]
+    at = (np.arange(count) + 0.5) / count * share[-1]
     faces = np.minimum(np.searchsorted(share, at), len(share) - 1)
-    # A sequence of few gaps within each triangle, folded at its diagonal.
-    one, other = (np.outer(number + 1, _GOLDEN) % 1.0).T
-    folded = one + other > 1.0
-    one, other = np.where(folded, 1.0 - one, one), np.where(folded, 1.0 - other, other)
-    a, b, c = (mesh.vertices[corner] for corner in mesh.faces[faces].T)
-    return a + one[:, None] * (b - a) + other[:, None] * (c - a), faces
+    return spread_in_triangles(mesh.vertices[mesh.faces[faces]]), faces
 
 
 def border_distance(

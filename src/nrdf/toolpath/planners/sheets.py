@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.frames import SIDES
 from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
@@ -37,12 +37,6 @@ stepovers apart at most."""
 _SHORT, _CONE = 1.0, 0.35
 """Of its border's length: how long a round sheet is that is worked around, at most; and how long
 its other border is, at least."""
-_SIDES = unit_vectors(
-    np.array(
-        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z],
-        dtype=np.float64,
-    )
-)
 
 
 def sheets_of(region: RegionMesh, part: Part, strategy: Strategy) -> list[Part]:
@@ -88,10 +82,10 @@ def felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndar
     """The smooth normal (f, 3) that a tool feels on each triangle, nearly: one for all triangles
     of a cell that is a fraction of the tool and look to one side."""
     cell = np.floor((mesh.centres - mesh.centres.min(axis=0)) * (_PER_RADIUS / radius_m))
-    side = (mesh.normals @ _SIDES.T).argmax(axis=1)
+    side = (mesh.normals @ SIDES.T).argmax(axis=1)
     cell = cell.astype(np.int64)
     count = cell.max(axis=0) + 1
-    key = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(_SIDES) + side
+    key = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(SIDES) + side
     _, number = np.unique(key, return_inverse=True)
     number = number.reshape(-1)
     total = np.maximum(np.bincount(number, mesh.areas), 1e-300)
