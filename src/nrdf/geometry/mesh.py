@@ -51,12 +51,14 @@ def triangle_crosses(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Along the normals (f, 3) of triangles, twice their areas long, of vertices (v, 3), faces
     (f, 3)."""
     a, b, c = (vertices[corner] for corner in faces.T)
-    return np.cross(b - a, c - a)
+    (x, y, z), (u, v, w) = (b - a).T, (c - a).T  # several times as fast as np.cross
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def triangle_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Areas (f,) of triangles, of vertices (v, 3), faces (f, 3)."""
-    return np.asarray(np.linalg.norm(triangle_crosses(vertices, faces), axis=1) / 2.0)
+    cross = triangle_crosses(vertices, faces)
+    return np.sqrt(np.einsum("fa,fa->f", cross, cross)) / 2.0
 
 
 def check_coordinate_range(points: np.ndarray) -> None:
@@ -161,7 +163,7 @@ def outer_skin(
     patch, flip = _patches(faces)
     faces = np.where(flip[:, None], faces[:, ::-1], faces)
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = triangle_crosses(vertices, faces)
     area = np.linalg.norm(cross, axis=1)
     cumulative = np.cumsum(area)
     if not cumulative[-1] > 0.0:

@@ -10,7 +10,8 @@ import numpy as np
 
 def step_lengths(line: np.ndarray) -> np.ndarray:
     """Distances (n - 1,) from each point of a line (n, d) to the next, in its unit."""
-    return np.asarray(np.linalg.norm(np.diff(line, axis=0), axis=1))
+    way = np.asarray(line)[1:] - np.asarray(line)[:-1]
+    return np.sqrt(np.einsum("na,na->n", way, way))  # several times as fast as norm
 
 
 def longest_step(line: np.ndarray) -> float:

@@ -76,12 +76,17 @@ def estimate_cycle_time(
     times = times or ArmTimes()
     process = free_s = strokes = length = worked = 0.0
     angles: set[int] = set()
-    for group in group_segments(segments):
+    groups = group_segments(segments)
+    picked = [_tried(group.process.positions) for group in groups]
+    chosen = list(zip(groups, picked, strict=True))
+    places = [np.zeros((0, 3)), *(g.process.positions[some] for g, some in chosen)]
+    axes = [np.zeros((0, 3)), *(g.process.axes[some] for g, some in chosen)]
+    # All at once: a question costs little more for many places than for one.
+    sides = free_sides(surface, np.concatenate(places), np.concatenate(axes), tool_radius_m)
+    cuts = np.cumsum([len(some) for some in picked])[:-1]
+    for group, free, shafts in zip(groups, *(np.split(of, cuts) for of in sides), strict=False):
         work = group.process
         along = arc_length(work.positions)
-        picked = np.searchsorted(along, np.arange(0.0, along[-1] + 1e-9, _STEP_M))
-        picked = np.unique(np.minimum(picked, len(along) - 1))
-        free, shafts = free_sides(surface, work.positions[picked], work.axes[picked], tool_radius_m)
         stretches, share, turned = _stretches(free, shafts, up)
         angles |= turned
         lifts = stretches + times.lifts_per_m * along[-1] * share
@@ -98,6 +103,13 @@ def estimate_cycle_time(
         strokes=strokes,
         reachable=worked / length if length else 1.0,
     )
+
+
+def _tried(positions: np.ndarray) -> np.ndarray:
+    """Which of positions (n, 3) the tool is tried at: (k,), ascending."""
+    along = arc_length(positions)
+    picked = np.searchsorted(along, np.arange(0.0, along[-1] + 1e-9, _STEP_M))
+    return np.unique(np.minimum(picked, len(along) - 1))
 
 
 def free_sides(

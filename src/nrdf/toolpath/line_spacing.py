@@ -57,8 +57,13 @@ def _crossings(
     going_on = np.append(np.diff(walked) < 2.0 * sampled.step, False)
     kept = going_on[j]
     i, j = i[kept], j[kept]
+    # A step that crosses the square begins no farther from it than steps are long.
+    ahead = np.einsum("pa,pa->p", places[j] - places[i], travel[i])
+    farthest = 2.0 * sampled.step * np.linalg.norm(travel, axis=1)
+    kept = np.abs(ahead) <= farthest[i]
+    i, j, before = i[kept], j[kept], ahead[kept]
     one, other = places[j] - places[i], places[np.minimum(j + 1, len(places) - 1)] - places[i]
-    before, after = (np.einsum("pa,pa->p", way, travel[i]) for way in (one, other))
+    after = np.einsum("pa,pa->p", other, travel[i])
     kept = (before * after <= 0.0) & (before != after)
     i, j, one, other, before, after = (v[kept] for v in (i, j, one, other, before, after))
     share = before / (before - after)

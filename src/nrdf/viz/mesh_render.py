@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.mesh import triangle_crosses
+from nrdf.geometry.mesh import row_keys, triangle_crosses
 from nrdf.viz.canvas import Canvas, counted
 from nrdf.viz.palette import AIR_MOVES, INSIDE
 from nrdf.viz.view import OVERSAMPLING, eye_dome, reduced
@@ -297,8 +297,9 @@ def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _merged(mesh: Triangles) -> tuple[np.ndarray, np.ndarray]:
     """Vertices and faces with equal vertices made one: without that, all edges are sharp."""
     vertices = np.asarray(mesh.vertices, np.float64)
-    unique, index = np.unique(np.round(vertices, 7), axis=0, return_inverse=True)
-    faces = index.reshape(-1)[np.asarray(mesh.faces, np.int64)]
+    vertices = np.round(vertices, 7)
+    _, first, index = np.unique(row_keys(vertices), return_index=True, return_inverse=True)
+    unique, faces = vertices[first], index.reshape(-1)[np.asarray(mesh.faces, np.int64)]
     return unique, np.ascontiguousarray(faces[triangle_crosses(unique, faces).any(axis=1)])
 
 

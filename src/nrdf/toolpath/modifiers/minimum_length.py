@@ -51,7 +51,10 @@ def _reached(
     path: SurfacePath, points: np.ndarray, normals: np.ndarray, radius_m: float
 ) -> np.ndarray:
     """Which points (k,) the footprint of a path passes over."""
-    away, near = cKDTree(path.contacts).query(points, distance_upper_bound=radius_m)
-    there = np.flatnonzero(np.isfinite(away))
-    alike = np.einsum("na,na->n", path.normals[near[there]], normals[there]) > _ALIKE
+    low, high = path.contacts.min(axis=0) - radius_m, path.contacts.max(axis=0) + radius_m
+    there = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    away, near = cKDTree(path.contacts).query(points[there], distance_upper_bound=radius_m)
+    reached = np.isfinite(away)
+    there, near = there[reached], near[reached]
+    alike = np.einsum("na,na->n", path.normals[near], normals[there]) > _ALIKE
     return np.asarray(there[alike])
