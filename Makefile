@@ -1,6 +1,7 @@
 # make demo: an environment, then nrdf at work on bundled shapes, in demo/
 # make studio: an environment, then the studio in a browser; its session is kept in studio/
 # make test: an environment with the tools, then ruff, mypy and all tests
+# make studio-tour: a path through the studio in a real browser, timed; pictures and a film
 # make docs: the documentation as a site, in build/site/
 # make wheel: the package as a file, in build/dist/; checked in an environment of its own
 # make fuzz: damaged files of every kind until stopped, or for as long as: make fuzz MINUTES=10
@@ -13,7 +14,7 @@ SUITABLE := -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10)
 PYTHON ?= $(shell for name in $(CANDIDATES); do \
 	$$name $(SUITABLE) 2>/dev/null && { echo $$name; break; }; done)
 
-.PHONY: demo studio test docs wheel fuzz format clean
+.PHONY: demo studio studio-tour test docs wheel fuzz format clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/nrdf.stamp
@@ -27,6 +28,9 @@ test: $(VENV)/dev.stamp
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+studio-tour: $(VENV)/dev.stamp
+	$(BIN)/python tools/studio_tour.py
 
 docs: $(VENV)/dev.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build

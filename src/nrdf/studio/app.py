@@ -50,7 +50,9 @@ class Studio(StudioContext):
         self.worker = Worker(working.started, working.progress, self._ended(working))
         self.arm_simulation.connect(simulating, self._ended(simulating))
         server.on_client_connect(self._welcome)
+        self._asked = False  # nothing is computed before a person does something
         self.restore()
+        self._asked = True
         if session.damage:
             self.show_error(f"⚠ **The session was damaged**: {session.damage}")
 
@@ -83,6 +85,8 @@ class Studio(StudioContext):
             self.arm_simulation.check_object()
             if gone or new:
                 self.arrange()
+                if self._asked:
+                    self.make_surfaces()
             self.mouse.update_callbacks()
             self.draw()
             self.panel.refresh()

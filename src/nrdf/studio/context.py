@@ -16,9 +16,9 @@ import numpy as np
 import viser
 
 from nrdf.errors import NrdfError
+from nrdf.studio.model.computed import CorrespondenceFeatures
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
-    CorrespondenceFeatures,
     LocalComputing,
 )
 from nrdf.studio.model.document import REFERENCE
@@ -38,7 +38,8 @@ from nrdf.studio.scene.drawing import (
     region_meshes_of,
     title_of,
 )
-from nrdf.studio.scene.scene_view import ObjectView, SceneView
+from nrdf.studio.scene.object_view import ObjectView
+from nrdf.studio.scene.scene_view import SceneView
 
 if TYPE_CHECKING:
     from nrdf.io.cloud import PointCloud
@@ -134,7 +135,8 @@ class StudioContext(ABC):
         plain = not (by_confidence or by_similarity)
         meshes = region_meshes_of(self.editor, self.results, key) if plain else {}
         result = self.results.by_target.get(key)
-        object_view.draw_surface(None if result is None else result.transfer_result.surface)
+        made = self.results.surface(key)
+        object_view.draw_surface(made if result is None else result.transfer_result.surface)
         object_view.draw_regions(meshes)
         if by_similarity:
             colours = similarity_colours(self._distances[key], self.similarity_width)
@@ -182,7 +184,16 @@ class StudioContext(ABC):
         document = self.editor.document
         self._submit("plan", "planning on the reference", delay_s,
                      lambda progress: self.results.make_plans(document, progress))  # fmt: skip
+        self.make_surfaces()
         self.refresh_panel()
+
+    def make_surfaces(self) -> None:
+        """Make the surfaces of scans, to be drawn in place of their points."""
+        document = self.editor.document
+        if not self.results.without_surface(document):
+            return
+        self._submit("surfaces", "making surfaces of scans", 0.0,
+                     lambda progress: self.results.make_surfaces(document, progress))  # fmt: skip
 
     def transfer(self, delay_s: float = 0.0) -> None:
         """Transfer the processes to the targets."""

@@ -14,7 +14,7 @@ from nrdf.studio.context import StudioContext
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.scene.camera import Camera, points_in_outline, points_in_rectangle
 from nrdf.studio.scene.drawing import about_point, found_indices
-from nrdf.studio.scene.scene_view import ObjectView
+from nrdf.studio.scene.object_view import ObjectView
 from nrdf.studio.tools import ACTS, ERASE, TOOLS, tool
 
 _BRUSH = 0.4  # radius of the brush, in radii of a patch

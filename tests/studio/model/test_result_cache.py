@@ -116,3 +116,19 @@ def test_similarity_is_greatest_around_the_point_itself(results):
     found = results.correspondence_features(document, silent)
     assert found.distances(17)["new"].shape == (len(results.editor.paintable("new").points),)
     assert found.objects[REFERENCE] is described.objects[REFERENCE], "computed once"
+
+
+def test_scans_get_the_surface_that_is_planned_on_once(results, monkeypatch):
+    editor = results.editor
+    assert results.surface(REFERENCE) is None
+    results.make_surfaces(editor.document, silent)
+    meshes = [results.surface(key) for key in (REFERENCE, "new")]
+    assert all(len(mesh.faces) > 500 for mesh in meshes)
+    low, high = meshes[1].vertices.min(axis=0), meshes[1].vertices.max(axis=0)
+    cloud = editor.target("new").object.cloud.points
+    np.testing.assert_allclose(high - low, np.ptp(cloud, axis=0), rtol=0.05)
+    monkeypatch.setattr(results._computing, "call", None)
+    results.make_surfaces(editor.document, silent)
+    editor.remove_target("new")
+    results.make_surfaces(editor.document, silent)
+    assert results.surface(REFERENCE) is meshes[0] and len(results._surfaces) == 1

@@ -7,7 +7,7 @@ leaves the studio and the session alive.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -17,16 +17,18 @@ import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.simplify import simplified
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
-from nrdf.process.check import CheckedProcess, check_process
+from nrdf.process.check import check_process
 from nrdf.process.model_choice import choose_model
-from nrdf.process.strategy import strategy_of
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
+from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
 from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
-from nrdf.studio.model.paintable_cloud import PaintableCloud
+from nrdf.studio.model.paintable_cloud import SHOWN_FACES, PaintableCloud
 from nrdf.studio.model.placing import PlacedScan, Placement, place_scan
 from nrdf.studio.model.teaching import bound_knowledge_of, process_of
 from nrdf.studio.model.uploads import (
@@ -36,7 +38,6 @@ from nrdf.studio.model.uploads import (
     shown_name,
 )
 from nrdf.studio.model.worker import Progress
-from nrdf.toolpath.tool_segments import contact_points
 
 if TYPE_CHECKING:
     from nrdf.field.encoded_cloud import EncodedCloud
@@ -47,45 +48,6 @@ _NOT_SENT = PointCloud(np.zeros((0, 3)))
 
 class ComputingProcessEnded(NrdfError):
     """The child process that computes has ended by itself."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A process step, planned on the reference.
-
-    fault: why there is no plan, "" where there is one; checked: None where the step is invalid.
-    """
-
-    fault: str
-    checked: CheckedProcess | None = None
-
-    @property
-    def lines(self) -> list[np.ndarray]:
-        """The contact points (m, 3) of each line, on the surface, m."""
-        if self.checked is None:
-            return []
-        strategy = strategy_of(self.checked.process)
-        work = (segment for segment in self.checked.segments if segment.kind == "process")
-        return [contact_points(segment, strategy) for segment in work]
-
-
-@dataclass(frozen=True)
-class CorrespondenceFeatures:
-    """Correspondence features of several objects, by
-    `nrdf.regions.reference.EncodedReference.correspondence_features`.
-
-    objects: (n, 6) of the shown points, by object. reference: (k, 6) of the reference's working
-    points; nearest: (m,) the working point of each point of its cloud.
-    """
-
-    objects: Mapping[str, np.ndarray]
-    reference: np.ndarray
-    nearest: np.ndarray
-
-    def distances(self, index: int) -> dict[str, np.ndarray]:
-        """Descriptor distances (k,) of each object's shown points to one of the reference."""
-        picked = self.reference[self.nearest[index]]
-        return {key: np.linalg.norm(f - picked, axis=1) for key, f in self.objects.items()}
 
 
 class LocalComputing:
@@ -178,7 +140,17 @@ class LocalComputing:
         except ProcessError as error:
             return Plan(f"region '{region.name}': {error}")
         checked = check_process(mesh, region.name, process, paintable.given)
-        return Plan(f"{checked.where}: {checked.fault}" if checked.fault else "", checked)
+        fault = f"{checked.where}: {checked.fault}" if checked.fault else ""
+        return Plan(fault, checked, Mesh(mesh.mesh.vertices, mesh.mesh.faces))
+
+    def surface(self, file: str, progress: Progress) -> Mesh | None:
+        """The surface of an object, as far as it is drawn; None where there can be none."""
+        progress(0, 1)
+        try:
+            made = self._paintable(file).surface_for()
+        except ProcessError:
+            return None
+        return Mesh(*simplified(made.vertices, made.faces, SHOWN_FACES))
 
     def prepare(self, revision: int, clouds: Path, document: Document, progress: Progress) -> None:
         """Prepare to transfer a document's processes to targets.

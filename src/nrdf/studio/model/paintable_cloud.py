@@ -23,6 +23,7 @@ from nrdf.surface.target_mesh import TargetMesh
 
 SHOWN_FACES = 200_000
 """Triangles of an object that a browser draws without a stutter."""
+_USUAL_RADIUS_M = 0.025
 
 
 class PaintableCloud:
@@ -67,15 +68,25 @@ class PaintableCloud:
         """The object as it was given, to measure tool paths against."""
         return given_surface(self._with_normals)
 
+    def surface_for(self, tool_radius_m: float | None = None) -> TargetMesh:
+        """The surface that paths of a tool are planned on; without one, that which there is.
+
+        Raises ProcessError where no mesh can be made.
+        """
+        if tool_radius_m is None and self._meshes:
+            return next(iter(self._meshes.values()))
+        radius = tool_radius_m or _USUAL_RADIUS_M
+        key = None if self.cloud.mesh is not None else radius  # an own mesh fits any tool
+        if key not in self._meshes:
+            self._meshes = {key: object_mesh(self._with_normals, radius)}
+        return self._meshes[key]
+
     def region(self, mask: np.ndarray, tool_radius_m: float) -> RegionMesh:
         """A mask of the shown points (k,) as a part of the object's mesh, for a tool.
 
         Raises ProcessError where no mesh can be made, or nothing of the region is left on it.
         """
-        key = None if self.cloud.mesh is not None else tool_radius_m  # an own mesh fits any tool
-        if key not in self._meshes:
-            self._meshes = {key: object_mesh(self._with_normals, tool_radius_m)}
-        mesh = self._meshes[key]
+        mesh = self.surface_for(tool_radius_m)
         return region_mesh(mesh, self.points, self.normals, mask.astype(float), tool_radius_m)
 
     @cached_property

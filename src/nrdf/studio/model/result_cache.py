@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
+from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer_result import TransferResult
+from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
-    CorrespondenceFeatures,
     LocalComputing,
-    Plan,
     without_clouds,
 )
 from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
@@ -50,6 +50,7 @@ class ResultCache:
         self.by_target: dict[str, TargetResult] = {}
         self._computing = computing
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
+        self._surfaces: dict[str, Mesh | None] = {}
         self._revision: tuple[Document, int] | None = None
         self._revisions = 0
 
@@ -93,6 +94,31 @@ class ResultCache:
             "clean_again", scan, model, reference, skipped, number, progress=progress
         )
         return placed
+
+    # --- surfaces
+
+    def surface(self, key: str) -> Mesh | None:
+        """The surface of a scan that is drawn, where one was made."""
+        target, reference = self.editor.target(key), self.editor.document.reference
+        loaded = reference if target is None else target.object
+        return None if loaded is None else self._surfaces.get(loaded.file)
+
+    def without_surface(self, document: Document) -> list[LoadedObject]:
+        """Scans whose surface has not been asked for."""
+        scans = [loaded for loaded in _objects(document) if loaded.cloud.mesh is None]
+        return [loaded for loaded in scans if loaded.file not in self._surfaces]
+
+    def make_surfaces(self, document: Document, progress: Progress) -> None:
+        """Make the surface of every scan that has none yet."""
+        objects = _objects(document)
+        files = {loaded.file for loaded in objects}
+        self._surfaces = {file: m for file, m in self._surfaces.items() if file in files}
+        waiting = self.without_surface(document)
+        for done, loaded in enumerate(waiting):
+            self._computing.use_objects(objects)
+            self._surfaces[loaded.file] = self._computing.call(
+                "surface", loaded.file, progress=_within(progress, done, len(waiting))
+            )
 
     # --- plans on the reference
 

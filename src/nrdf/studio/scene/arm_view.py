@@ -8,7 +8,7 @@ import viser
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.studio.model.playback import EVERY_PATH, FLOOR, Playback
-from nrdf.studio.scene.scene_view import ObjectView
+from nrdf.studio.scene.object_view import ObjectView
 
 _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the cell's frame, z up, to the scene's, y up; the object's x stays x."""
@@ -23,8 +23,8 @@ class ArmView:
 
     def __init__(self, object_view: ObjectView, playback: Playback) -> None:
         self.object_view, self.playback = object_view, playback
-        self._factor = object_view.scene_view.units_per_m
-        self._scene = object_view.scene_view.server.scene
+        self._factor = object_view.units_per_m
+        self._scene = object_view.server.scene
         wxyz = quaternions_wxyz(_CELL)
         self._root = self._scene.add_frame("/arm", show_axes=False, wxyz=wxyz)
         self._bodies: dict[int, viser.FrameHandle] = {}

@@ -12,7 +12,7 @@ from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.placing import removed_points
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.scene.colours import confidence_colours, painted_colours
-from nrdf.surface.target_mesh import TargetMesh
+from nrdf.viz.mesh_render import Triangles
 
 _MOST_REMOVED = 20_000
 _DEEP, _PALE = 0.5, 0.62
@@ -30,13 +30,20 @@ def found_indices(results: ResultCache, key: str, region: str) -> np.ndarray | N
 
 def region_meshes_of(
     editor: Editor, results: ResultCache, key: str
-) -> dict[str, tuple[TargetMesh, np.ndarray]]:
-    """The meshes of a target's regions that were found: name to (mesh, m; colour (3,)), paler where
-    the confidence is lower. Regions that a person has corrected have none: they are painted."""
+) -> dict[str, tuple[Triangles, np.ndarray]]:
+    """The meshes of an object's regions as they are planned on: name to (mesh, m; colour (3,)), on
+    a target paler where the confidence is lower. Regions that a person has corrected, or that are
+    not planned, have none: they are painted."""
     result, target = results.by_target.get(key), editor.target(key)
+    if key == REFERENCE:
+        return {
+            region.name: (plan.region, np.array(_pale(region.colour)))
+            for region in editor.document.regions
+            if (plan := results.plan(region, 0)) is not None and plan.region is not None
+        }
     if result is None or target is None:
         return {}
-    drawn = {}
+    drawn: dict[str, tuple[Triangles, np.ndarray]] = {}
     for region in editor.document.regions:
         found = result.transfer_result.regions.get(region.name)
         if found is None or found.mesh is None or region.name in target.corrected:
