@@ -64,6 +64,8 @@ def main() -> None:
         print(f"a click of Grow, 0.2 m, its colours and the saved session: {took(grow):.4f} s")
         editor.paint(REFERENCE, "seat", truth["seat"])
         print(f"plans on a seat and a backrest: {took(plan, 1):.2f} s")
+        editor.change_numbers("seat", 0, {"stepover_mm": 22.0})
+        print(f"the seat's plan again, after a number was changed: {took(plan, 1):.2f} s")
         document = editor.document
         spent = took(lambda: results.transfer(document, silent), 1)
         print(f"both on {TARGETS[0]}, regions and tool paths: {spent:.2f} s")

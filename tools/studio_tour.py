@@ -45,6 +45,7 @@ TABS = ("1 Reference", "2 Regions", "3 Process", "4 Targets", "5 Save", "6 Robot
 # Few frames a second: drawing without a graphics card takes what the server needs.
 SELDOM = """const draw = window.requestAnimationFrame;
 window.requestAnimationFrame = (frame) => setTimeout(() => draw(frame), 120);"""
+WITHOUT_NOTES = ".mantine-Notifications-root { display: none !important }"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -62,7 +63,7 @@ class Tour:
     def press(self, name: str) -> None:
         """Click a button."""
         self.clicks += 1
-        self.page.get_by_role("button", name=name, exact=True).last.click()
+        self.page.get_by_role("button", name=name, exact=True).last.click(force=True)
 
     def tab(self, name: str) -> None:
         """Click a tab."""
@@ -105,11 +106,9 @@ class Tour:
 
     def shoot(self, name: str) -> None:
         """A picture, which is a frame of the film too."""
-        for note in self.page.locator(".mantine-Notification-closeButton").all():
-            note.click(timeout=5e3)
         time.sleep(0.6)
         path = OUT / f"{len(self.frames) + 1:02}-{name}.png"
-        self.page.screenshot(path=path, timeout=60e3)
+        self.page.screenshot(path=path, timeout=60e3, style=WITHOUT_NOTES)
         self.frames.append(path)
 
     def check_access(self, where: str) -> None:

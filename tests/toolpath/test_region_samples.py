@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,17 @@ def test_samples_are_even_deterministic_and_about_a_quarter_radius_apart():
     np.testing.assert_array_equal(samples.points, RegionSamples.of(block(), STRATEGY).points)
     np.testing.assert_allclose(samples.normals, np.tile([0, 0, 1.0], (len(samples.points), 1)))
     assert samples.accessible.all() and samples.inside_margin.all()
+
+
+def test_samples_of_a_region_are_worked_out_once_and_not_sent_to_other_processes():
+    region = block()
+    samples = RegionSamples.of(region, STRATEGY)
+    assert RegionSamples.of(region, replace(STRATEGY, stepover_m=0.02)) is samples
+    finer = RegionSamples.of(region, replace(STRATEGY, tool_radius_m=0.01))
+    assert len(finer.points) > len(samples.points)
+    margin = RegionSamples.of(region, replace(STRATEGY, edge_margin_m=0.03))
+    assert not margin.inside_margin.all() and samples.inside_margin.all()
+    assert not pickle.loads(pickle.dumps(region)).memo
 
 
 @pytest.mark.parametrize("off_m", [-0.002, 0.002])

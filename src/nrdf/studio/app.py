@@ -160,6 +160,7 @@ class Studio(StudioContext):
         self.worker.stop()
         self.results.stop()
         self.arm_simulation.stop()
+        self.panel.overlay.thumbnails.stop()
 
     def _ended(self, bar: ProgressBar) -> Callable[[str, str], None]:
         """What a worker calls when a job has ended: (what it was, error or "")."""

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_PLAN_AFTER_S = 0.4
+_PLAN_AFTER_S = 0.15
 
 
 class StudioContext(ABC):
@@ -108,6 +108,12 @@ class StudioContext(ABC):
     @abstractmethod
     def show_error(self, text: str) -> None:
         """Show in the panel what went wrong last; "" removes it."""
+
+    def show_target(self, key: str | None) -> None:
+        """Show one target beside the reference, or all."""
+        self.shown_target = key if key in self.editor.object_keys() else None
+        self.arrange()
+        self.refresh_panel()
 
     # --- drawing
 
@@ -210,44 +216,35 @@ class StudioContext(ABC):
         """
         name, content = file.name, file.content
         check_upload(name, len(content))
-
-        def work(progress: Progress) -> None:
-            cloud = self.results.read(name, content, category, unit, progress)
-            with self.lock:
-                then(cloud)
-
-        self._uploads += 1  # each is a job of its own
-        self._submit(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
+        self._read(f"reading {shown_name(name)}", then,
+                   lambda told: self.results.read(name, content, category, unit, told))  # fmt: skip
 
     def read_scan(self, file: Any, unit: str | None, then: Callable[[PlacedScan], None]) -> None:
         """Read a scan that a browser sent, and give it, cleaned and placed, to `then`.
 
         Raises CloudError for a file of another type, or too large a one.
         """
-        name, content = file.name, file.content
+        name, content, document = file.name, file.content, self.editor.document
         check_upload(name, len(content))
-        document = self.editor.document
-
-        def work(progress: Progress) -> None:
-            placed = self.results.read_scan(name, content, document, unit, progress)
-            with self.lock:
-                then(placed)
-
-        self._uploads += 1
-        what = f"reading {shown_name(name)}, and finding how it stands"
-        self._submit(f"read {self._uploads}", what, 0.0, work)
+        what, results = f"reading {shown_name(name)}, and finding how it stands", self.results
+        self._read(what, then, lambda told: results.read_scan(name, content, document, unit, told))
 
     def read_knowledge(self, file: Any, then: Callable[[BoundKnowledge], None]) -> None:
         """Read a ZIP archive of knowledge that a browser sent, and give it to `then`."""
         name, content = file.name, file.content
+        self._read(f"reading {shown_name(name)}", then,
+                   lambda told: self.results.read_knowledge(name, content, told))  # fmt: skip
 
+    def _read(
+        self, what: str, then: Callable[[Any], None], read: Callable[[Progress], Any]
+    ) -> None:
         def work(progress: Progress) -> None:
-            bound = self.results.read_knowledge(name, content, progress)
+            made = read(progress)
             with self.lock:
-                then(bound)
+                then(made)
 
-        self._uploads += 1
-        self._submit(f"read {self._uploads}", f"reading {shown_name(name)}", 0.0, work)
+        self._uploads += 1  # each is a job of its own
+        self._submit(f"read {self._uploads}", what, 0.0, work)
 
     def clean_again(
         self, scan: PointCloud, skipped: Sequence[str], number: int,

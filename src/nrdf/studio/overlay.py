@@ -14,16 +14,19 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import viser
 
+from nrdf.studio.arm_simulation import ArmSimulation
 from nrdf.studio.context import StudioContext
 from nrdf.studio.mouse import Mouse, camera_of
-from nrdf.studio.scene.colours import legend_of
+from nrdf.studio.scene.colours import hexadecimal, legend_of
+from nrdf.studio.scene.drawing import title_of
 from nrdf.studio.serving import StudioServer
+from nrdf.studio.thumbnails import Thumbnails
 from nrdf.studio.tools import ACTS, ERASE, TOOLS
 
 if TYPE_CHECKING:
     from nrdf.studio.panels.inputs import Inputs
 
-_MOST_CORNERS = 400
+_MOST_CORNERS, _MOST_PARTS = 400, 200
 _STATE = '<div data-nrdf-state="{}" hidden></div>'
 _CLIENT = '<div data-nrdf-client="{}" hidden></div>'
 
@@ -39,16 +42,19 @@ class Overlay:
     """panel: what buttons and keys do."""
 
     def __init__(
-        self, context: StudioContext, mouse: Mouse, inputs: Inputs, panel: Takes
+        self, context: StudioContext, mouse: Mouse, simulation: ArmSimulation, inputs: Inputs,
+        panel: Takes,
     ) -> None:  # fmt: skip
         self.context, self.mouse, self._inputs, self._panel = context, mouse, inputs, panel
+        self._simulation, self.thumbnails = simulation, Thumbnails(self._drawn)
         self._state = context.server.gui.add_html("")
         context.server.on_client_connect(self._welcome)
         context.server.on_client_disconnect(lambda c: context.read_only.discard(c.client_id))
         if isinstance(context.server, StudioServer):
             context.server.page.answers |= {
                 "tool": self._act, "act": self._act, "hover": self._hover, "lasso": self._lasso,
-                "read_only": self._look_only,
+                "read_only": self._look_only, "target": self._show_target, "seek": self._seek,
+                "thumbnail": lambda values: self.thumbnails.png(values["name"]),
             }  # fmt: skip
 
     def refresh(self) -> None:
@@ -67,10 +73,54 @@ class Overlay:
             "erase_key": ERASE.key,
             "acts": [[each.name, each.key, each.hint] for each in ACTS],
             "legend": legend_of(context.colouring, context.editor.document.regions),
-            "targets": [],
-            "preview": "",
-            "line": [],
+            "targets": self._targets(),
+            "line": self._line(),
         }
+
+    def _targets(self) -> list[tuple[str, str, str, bool]]:
+        """Name, words, stamp of the picture, and whether it alone is shown: the most doubtful
+        first; [] for a single target."""
+        context = self.context
+        keys = context.editor.object_keys()[1:]
+        if len(keys) < 2:
+            return []
+        found = context.results.by_target
+
+        def doubt(key: str) -> tuple[int, float]:
+            if key not in found:
+                return 1, 0.0
+            regions = found[key].transfer_result.regions.values()
+            least = min((0.0 if r.missing else r.match.score for r in regions), default=1.0)
+            return (0 if found[key].uncertain_regions else 2), least
+
+        return [
+            (key, title_of(context.editor, context.results, key),
+             self.thumbnails.stamp(key, found.get(key)), key == context.shown_target)
+            for key in sorted(keys, key=doubt)
+        ]  # fmt: skip
+
+    def _line(self) -> list[tuple[float, float, str, str, bool]]:
+        """The simulation's time line, a part for each tool path: when it begins, how long it is,
+        its colour, what is said of it, and whether waypoints were not reached; [] without one."""
+        playback = self._simulation.playback
+        if playback is None or not self._simulation.shown:
+            return []
+        begins = np.flatnonzero(np.diff(playback.path, prepend=-1))[:_MOST_PARTS]
+        ends = [*playback.times[begins[1:]], playback.seconds]
+        parts = []
+        for begin, end in zip(begins, ends, strict=True):
+            path = playback.report["paths"][int(playback.path[begin])]
+            missed = path["waypoints"] - path["reached"]
+            region = self.context.editor.document.region(path["region"])
+            colour = "#9aa0a6" if region is None else hexadecimal(np.array(region.colour))
+            words = f"{path['region']}, {path['process']}: {missed or 'no'} waypoints not reached"
+            start = float(playback.times[begin])
+            parts.append((round(start, 2), round(float(end) - start, 2), colour, words, missed > 0))
+        return parts
+
+    def _drawn(self) -> None:
+        with self.context.lock:
+            self.refresh()
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         client.gui.add_html(_CLIENT.format(client.client_id))
@@ -102,6 +152,24 @@ class Overlay:
     def _look_only(self, values: Mapping[str, str]) -> dict[str, object]:
         self.context.read_only.add(self._client(values).client_id)
         return {}
+
+    def _show_target(self, values: Mapping[str, str]) -> dict[str, object]:
+        name = values["name"]
+
+        def show(_: viser.ClientHandle) -> None:
+            self.context.show_target(name or None)
+
+        return self._soon(values, show)
+
+    def _seek(self, values: Mapping[str, str]) -> dict[str, object]:
+        time_s = float(values["time"])
+        if not np.isfinite(time_s):
+            raise ValueError("a time must be a number")
+        return self._soon(values, lambda _: self._jump(time_s))
+
+    def _jump(self, time_s: float) -> None:
+        self._simulation.seek(time_s)
+        self._simulation.on_time()
 
     def _soon(
         self, values: Mapping[str, str], act: Callable[[viser.ClientHandle], None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from threading import RLock
@@ -47,6 +47,11 @@ class RegionMesh:
         if not face_mask.any():
             raise ProcessError("a region must have at least one face of the target's mesh")
         return RegionMesh(target.submesh(face_mask), target)
+
+    @cached_property
+    def memo(self) -> dict[Hashable, Any]:
+        """What was worked out of the region before, by all that it depends on."""
+        return {}
 
     @property
     def area_m2(self) -> float:

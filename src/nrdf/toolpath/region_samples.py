@@ -62,6 +62,15 @@ class RegionSamples:
 
         The same for the same region. Raises ProcessError where the tool has its clearance nowhere.
         """
+        margin = strategy.edge_margin_m
+        key = (RegionSamples, strategy.tool_radius_m, strategy.clearance_m, margin)
+        if key not in region.memo:
+            region.memo[key] = RegionSamples._of(region, strategy)
+        kept: RegionSamples = region.memo[key]
+        return kept
+
+    @staticmethod
+    def _of(region: RegionMesh, strategy: Strategy) -> RegionSamples:
         points, faces = sample_evenly(region.mesh, strategy.tool_radius_m / _PER_RADIUS)
         normals = region.mesh.face_normals[faces]
         needed = needed_clearance(strategy.clearance_m, strategy.tool_radius_m)

@@ -30,3 +30,12 @@ def test_a_mesh_is_shown_with_at_most_so_many_triangles(monkeypatch):
     monkeypatch.setattr("nrdf.studio.model.paintable_cloud.SHOWN_FACES", 500)
     assert 100 < len(PaintableCloud(whole).mesh.faces) <= 500
     assert PaintableCloud(cloud(SIZE, 600, 0)).mesh is None
+
+
+def test_a_region_is_cut_out_of_the_surface_once():
+    body = PaintableCloud(cloud(0.5 * SIZE, 1500, 0))
+    top = body.points[:, 1] > body.high[1] - 1e-6
+    region = body.region(top, 0.025)
+    assert body.region(top.copy(), 0.025) is region
+    assert body.region(top & (body.points[:, 0] > 0.0), 0.025) is not region
+    assert body.surface_for() is region.parent

@@ -12,6 +12,8 @@ pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 from nrdf.errors import RegionError
 from nrdf.studio.panels.inputs import Inputs, ProgressBar
 
+BROWSER = SimpleNamespace(client_id=7)
+
 
 def events(inputs, act):
     """The function that the browser's events call for `act`."""
@@ -26,13 +28,23 @@ def test_a_value_that_a_person_has_just_set_is_not_overwritten(page):
     send = events(inputs, lambda event: done.append(event.value))
     with page.studio.lock:  # the event waits for it
         handle.value = "typed"
-        asyncio.run(send(SimpleNamespace(client="a browser", target=handle)))
+        asyncio.run(send(SimpleNamespace(client=BROWSER, target=handle)))
         inputs.set_value(handle, "from the program")
         assert handle.value == "typed" and not done
     inputs._executor.shutdown()
     assert done == ["typed"]
     inputs.set_value(handle, "from the program")
     assert handle.value == "from the program"
+
+
+def test_who_may_only_look_sets_nothing(page):
+    inputs, done = Inputs(page.studio), []
+    page.studio.read_only.add(BROWSER.client_id)
+    send = events(inputs, done.append)
+    asyncio.run(send(SimpleNamespace(client=BROWSER, target=SimpleNamespace(value=1))))
+    inputs.soon(lambda: done.append("soon"))
+    inputs._executor.shutdown()
+    assert done == ["soon"]
 
 
 def test_values_of_the_program_are_no_events_and_errors_are_shown(page):
@@ -44,7 +56,7 @@ def test_values_of_the_program_are_no_events_and_errors_are_shown(page):
     send = events(inputs, refuse)
     asyncio.run(send(SimpleNamespace(client=None, target=SimpleNamespace(value=1))))
     assert not inputs._pending
-    asyncio.run(send(SimpleNamespace(client="a browser", target=SimpleNamespace(value=1))))
+    asyncio.run(send(SimpleNamespace(client=BROWSER, target=SimpleNamespace(value=1))))
     inputs._executor.shutdown()
     assert "no such region" in page.studio.panel.error.content
 

@@ -24,6 +24,7 @@ from nrdf.surface.target_mesh import TargetMesh
 SHOWN_FACES = 200_000
 """Triangles of an object that a browser draws without a stutter."""
 _USUAL_RADIUS_M = 0.025
+_MOST_REGIONS = 12  # that are kept
 
 
 class PaintableCloud:
@@ -43,6 +44,7 @@ class PaintableCloud:
         self.normals = estimate_normals(self.points) if given is None else given[self.shown]
         self.surface = Surface(self.points, self.normals)
         self._meshes: dict[float | None, TargetMesh] = {}
+        self._regions: dict[tuple[bytes, float, int], RegionMesh] = {}
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
 
     @property
@@ -87,7 +89,12 @@ class PaintableCloud:
         Raises ProcessError where no mesh can be made, or nothing of the region is left on it.
         """
         mesh = self.surface_for(tool_radius_m)
-        return region_mesh(mesh, self.points, self.normals, mask.astype(float), tool_radius_m)
+        key = (np.packbits(mask).tobytes(), tool_radius_m, id(mesh))
+        if key not in self._regions:  # numbers of a process change more often than its region
+            kept = list(self._regions.items())[1 - _MOST_REGIONS :]
+            made = region_mesh(mesh, self.points, self.normals, mask.astype(float), tool_radius_m)
+            self._regions = {**dict(kept), key: made}
+        return self._regions[key]
 
     @cached_property
     def _with_normals(self) -> PointCloud:

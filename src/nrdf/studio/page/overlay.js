@@ -20,10 +20,9 @@
   const strip = make("nav", { id: "nrdf-strip", ariaLabel: "Targets" });
   const line = make("div", { id: "nrdf-line", role: "group", ariaLabel: "Time line" });
   const legend = make("ul", { id: "nrdf-legend", ariaLabel: "Colours" });
-  const preview = make("p", { id: "nrdf-preview", role: "status" });
   const tip = make("div", { id: "nrdf-tip", role: "tooltip", hidden: true });
   const lasso = make("div", { id: "nrdf-lasso", hidden: true });
-  root.append(make("h1", {}, ["nrdf studio"]), lasso, tools, legend, strip, preview, line, tip);
+  root.append(make("h1", {}, ["nrdf studio"]), lasso, tools, legend, strip, line, tip);
 
   const canvas = () => document.querySelector("canvas");
   let state = {}, shown = "";
@@ -61,17 +60,15 @@
     }));
     legend.hidden = !state.legend.length;
     strip.replaceChildren(...state.targets.map(([name, words, stamp, chosen]) => {
-      const seen = make("img", { src: `/nrdf/thumbnail?name=${encodeURIComponent(name)}&at=${stamp}`,
-        alt: "", loading: "lazy" });
       const made = make("button", { type: "button", title: words,
-        onclick: () => own("target", { name: chosen ? "" : name }) },
-        [seen, make("span", {}, [words])]);
+        onclick: () => own("target", { name: chosen ? "" : name }) });
+      if (stamp) made.append(make("img", { alt: "", loading: "lazy",
+        src: `/nrdf/thumbnail?name=${encodeURIComponent(name)}&at=${stamp}` }));
+      made.append(make("span", {}, [words]));
       made.ariaPressed = String(chosen);
       return made;
     }));
     strip.hidden = state.targets.length < 2;
-    preview.textContent = state.preview;
-    preview.hidden = !state.preview;
     line.replaceChildren(...state.line.map(([from, share, colour, words, bad]) => {
       const part = make("button", { type: "button", title: words, ariaLabel: words,
         className: bad ? "bad" : "", onclick: () => own("seek", { time: from }) });
@@ -105,7 +102,8 @@
     for (const bar of document.querySelectorAll("[role=progressbar]"))
       bar.ariaLabel ??= "Progress";
     for (const bare of document.querySelectorAll("button, [role=button]"))
-      if (!bare.textContent.trim() && !bare.ariaLabel && !bare.title) bare.ariaLabel = "Fold panel";
+      if (!bare.textContent.trim() && !bare.ariaLabel && !bare.title)
+        bare.ariaLabel = bare.className.includes("closeButton") ? "Close" : "Fold panel";
     canvas()?.setAttribute("aria-label", "The objects");
     canvas()?.setAttribute("role", "img");
   }

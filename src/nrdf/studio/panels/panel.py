@@ -75,7 +75,7 @@ class Panel:
         for each in (*TOOLS, ERASE, *ACTS):
             command = gui.add_command(each.name, hotkey=each.key)
             inputs.on(command.on_trigger, partial(self._take, each.name))
-        self.overlay = Overlay(context, mouse, inputs, self)
+        self.overlay = Overlay(context, mouse, simulation, inputs, self)
         inputs.on(self.region.on_update, lambda event: self._select_region(event.value))
         keys: tuple[tuple[str, Literal["Z", "Y"], Callable[[PanelEvent], None]], ...] = (
             ("Undo", "Z", self.regions.undo), ("Redo", "Y", self.regions.redo),

@@ -116,8 +116,7 @@ class TargetsTab:
         self.context.transfer()
 
     def _show(self, shown: str) -> None:
-        self.context.shown_target = None if shown == ALL else shown
-        self.context.arrange()
+        self.context.show_target(None if shown == ALL else shown)
 
     def _recolour(self) -> None:
         self.context.recolour(self.colours.value, float(self.width.value))

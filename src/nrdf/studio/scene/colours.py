@@ -52,13 +52,14 @@ def similarity_colours(distance: np.ndarray, width: float) -> np.ndarray:
 def legend_of(colouring: str, regions: Sequence[PaintedRegion]) -> list[tuple[str, str]]:
     """What the colours of objects mean: (words, colour in hexadecimal) each."""
     if colouring == "regions":
-        several = [("in several regions", _hexadecimal(np.array(SEVERAL_REGIONS)))]
-        own = [(region.name, _hexadecimal(np.array(region.colour))) for region in regions]
+        several = [("in several regions", hexadecimal(np.array(SEVERAL_REGIONS)))]
+        own = [(region.name, hexadecimal(np.array(region.colour))) for region in regions]
         return own + (several if len(regions) > 1 else [])
     scale = confidence_scale if colouring == "confidence" else similarity_scale
     words = {1.0: f"{colouring} 1", 0.5: "0.5", 0.0: "0"}
-    return [(w, _hexadecimal(scale(np.array([v]))[0])) for v, w in words.items()]
+    return [(w, hexadecimal(scale(np.array([v]))[0])) for v, w in words.items()]
 
 
-def _hexadecimal(colour: np.ndarray) -> str:
+def hexadecimal(colour: np.ndarray) -> str:
+    """A colour (3,), 0 to 255, as "#rrggbb"."""
     return "#" + "".join(f"{int(value):02x}" for value in colour)

@@ -1,0 +1,57 @@
+"""Small pictures of targets with their tool paths, drawn in the background."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from PIL import Image
+
+from nrdf.reports.job_folder import panel_of
+from nrdf.studio.model.result_cache import TargetResult
+from nrdf.viz.picture import render_panels
+
+log = logging.getLogger(__name__)
+
+_WIDTH = 140
+
+
+class Thumbnails:
+    """One picture for each target, of its newest result. ready: called when one was drawn."""
+
+    def __init__(self, ready: Callable[[], None]) -> None:
+        self._ready = ready
+        self._asked: dict[str, TargetResult] = {}
+        self._drawn: dict[str, tuple[TargetResult, bytes]] = {}
+        self._executor = ThreadPoolExecutor(1, "studio thumbnails")
+
+    def stamp(self, name: str, result: TargetResult | None) -> str:
+        """What differs for different pictures of a target; one that is missing is drawn soon."""
+        if result is None:
+            return ""
+        if self._asked.get(name) is not result:
+            self._asked[name] = result
+            self._executor.submit(self._draw, name, result)
+        drawn = self._drawn.get(name)
+        return str(id(result)) if drawn is not None and drawn[0] is result else ""
+
+    def png(self, name: str) -> bytes:
+        """The last picture of a target. Raises KeyError where there is none yet."""
+        return self._drawn[name][1]
+
+    def stop(self) -> None:
+        """Draw no more."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
+
+    def _draw(self, name: str, result: TargetResult) -> None:
+        try:
+            rows, _ = render_panels([panel_of(result.transfer_result, name)], _WIDTH)
+        except Exception:  # a picture less is no reason to stop
+            log.exception("no thumbnail of %s", name)
+            return
+        content = io.BytesIO()
+        Image.fromarray((255 * rows[0][0]).clip(0, 255).astype("uint8")).save(content, "PNG")
+        self._drawn[name] = result, content.getvalue()
+        self._ready()
