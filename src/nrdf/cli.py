@@ -29,7 +29,8 @@ FOR_MAKERS = ("model", *BENCHMARK)
 """Verbs that stand apart in the help."""
 RESUMABLE = (
     "ablate", "run", "serve", "eval bsrc", "eval presence", "model boxes", "model correspond",
-    "model kind", "model learn", "model prepare", "model synth", "model train", "model yaw",
+    "model general", "model kind", "model learn", "model prepare", "model synth", "model train",
+    "model yaw",
 )  # fmt: skip
 """Verbs that go on where they were when the same command is given again."""
 

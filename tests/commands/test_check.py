@@ -20,13 +20,13 @@ def test_check_finds_a_category_that_no_model_is_for(taught, untrained, capsys):
     assert cli.run(["check", str(path)]) == 2
     asked = capsys.readouterr().err
     assert "category: no model for the category 'chiar'; did you mean 'chair'?" in asked
-    assert "model: registration" in asked
+    assert "model: general" in asked
     assert cli.run(["check", str(path), "--model", "registration"]) == 0
     assert cli.run(["check", str(path), "--model", str(untrained)]) == 2
     assert "is for chair" in capsys.readouterr().err
     path.write_text(path.read_text().replace("category: chiar", "category: helmet", 1))
     assert cli.run(["check", str(path)]) == 0
-    assert "found by registration" in " ".join(capsys.readouterr().out.split())
+    assert "found by the general model" in " ".join(capsys.readouterr().out.split())
     path.write_text(path.read_text().replace("category: helmet", "category: chiar", 1))
     text = path.read_text()
     path.write_text(text.replace("allow_unusual: false", "allow_unusual: true", 1))

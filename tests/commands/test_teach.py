@@ -19,7 +19,7 @@ def test_a_placeholder_says_what_to_do(box_files, capsys):
     assert cli.run([*words.split(), "--overwrite"]) == 0
 
 
-def test_a_new_category_is_served_by_registration_and_a_misspelt_one_is_asked_back(
+def test_a_new_category_is_served_by_the_general_model_and_a_misspelt_one_is_asked_back(
     box_files, capsys
 ):
     words = f"teach --reference {box_files}/box.ply --out {box_files}/sofa.yaml"
@@ -28,8 +28,8 @@ def test_a_new_category_is_served_by_registration_and_a_misspelt_one_is_asked_ba
     assert "did you mean 'chair'?" in capsys.readouterr().err
     assert not (box_files / "sofa.yaml").exists()
     assert cli.run([*words.split(), "sofa"]) == 0
-    assert "found by registration" in " ".join(capsys.readouterr().err.split())
-    assert "model: registration" in (box_files / "sofa.yaml").read_text()
+    assert "found by the general model" in " ".join(capsys.readouterr().err.split())
+    assert "model: general" in (box_files / "sofa.yaml").read_text()
     assert cli.run(["check", str(box_files / "sofa.yaml")]) == 0
     assert cli.run([*words.split(), "chiar", "--allow-unusual", "--overwrite"]) == 0
 

@@ -29,7 +29,9 @@ def test_presets_of_other_packages_come_after_our_own(monkeypatch):
 
 def test_an_unknown_preset_names_those_that_exist(monkeypatch):
     monkeypatch.setattr(nrdf.field, "entry_points", points_by(("rival", "nowhere:Nothing")))
-    with pytest.raises(ConfigError, match=r"no preset 'papr'.*default, paper, registration, rival"):
+    with pytest.raises(
+        ConfigError, match=r"no preset 'papr'.*default, general, paper, registration, rival"
+    ):
         field_class("papr")
     with pytest.raises(ConfigError, match="'rival' cannot be loaded from nowhere:Nothing"):
         field_class("rival")

@@ -96,11 +96,11 @@ def test_the_model_is_named_where_it_is_not_the_categorys_own(files, untrained):
     with pytest.raises(ProcessError, match=r"did you mean 'chair'\?"):
         new_knowledge(reference, "chiar", files)
     meant = new_knowledge(reference, "chiar", files, allow_unusual=True, unit="m")
-    assert (meant.category, meant.model, meant.allow_unusual) == ("chiar", "registration", True)
+    assert (meant.category, meant.model, meant.allow_unusual) == ("chiar", "general", True)
     assert new_knowledge(reference, "chair", files).model is None
     assert new_knowledge(reference, "chair", files, model="registration").model == "registration"
     assert new_knowledge(reference, "chair", files, model=str(untrained)).model is None
     helmet = new_knowledge(reference, "helmet", files, unit="m")
-    assert helmet.model == "registration" and not helmet.allow_unusual
+    assert helmet.model == "general" and not helmet.allow_unusual
     with pytest.raises(ProcessError, match=r"category is 'chiar', but the model .* is for chair"):
         new_knowledge(reference, "chiar", files, model=str(untrained), allow_unusual=True)

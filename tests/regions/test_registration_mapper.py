@@ -65,3 +65,17 @@ def test_a_target_is_registered_once_whoever_asks(model, stretched, monkeypatch)
         found = list(pool.map(lambda _: mapper.map_working(stretched), range(4)))
     assert len(calls) == 1
     assert all(one.points is found[0].points for one in found)
+
+
+def test_with_the_general_field_it_begins_there_and_knows_its_error():
+    model = nrdf.load_model("general")
+    cloud = chair()[0]
+    far = np.array([0.7, 1.0, 1.6])
+    source = model.encode(cloud)
+    target = model.encode(PointCloud(cloud.points * far, cloud.normals))
+    mapper = RegistrationMapper(source, model)
+    mapped = mapper.map_working(target)
+    assert errors(mapped, target, target.cloud.points).mean() < 0.015
+    assert (mapped.error > 0).all()
+    back = mapper.map_back(target, np.arange(200))
+    assert np.linalg.norm(back.points - source.points[:200], axis=1).mean() < 0.015

@@ -52,8 +52,8 @@ def align(
 
     Args:
         scan: Point cloud or mesh, or a ROS 2 bag, of one object, in any pose and unit.
-        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder; or
-            registration, which serves any category, and aligns by a --reference.
+        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder;
+            general or registration, which serve any category, and align by a --reference.
         out: Folder to write; aligned-NAME unless given.
         up: Direction in the scan that points up: x, y, z, -x, -y, -z, or 'x y z'; auto takes the
             floor's, or tries the axes, which takes longer.

@@ -46,6 +46,7 @@ def info(as_json: bool = False) -> None:
             console.print(f"  {model['note']}", style="dim")
         for source, licences in model["licences"].items():
             console.print(f"  {source}: {licences}", style="dim")
+    console.print("general: for any category, the default of one without a model of its own")
     console.print("registration: trained on nothing, for any category (--model registration)")
 
 

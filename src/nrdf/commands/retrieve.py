@@ -58,7 +58,7 @@ def retrieve(
 ) -> int:
     """Find the regions of a reference object on a target object.
 
-    Both are of the category that the model is for, or, with --model registration, of any one. With
+    Both are of the category that the model is for, or, with --model general, of any one. With
     --up the target is a scan in any pose: it is cleaned and aligned first, as by `nrdf align`.
 
     Writes into the output folder: for each region a PLY of the target's own points in it, with
@@ -71,8 +71,8 @@ def retrieve(
     new.ply
 
     Args:
-        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder; or
-            registration, which serves any category.
+        model: Name in the zoo (see `nrdf info`), weight file, or training run's folder;
+            general or registration, which serve any category.
         reference: Cloud or mesh of the object on which the regions are known: +X forward, +Y up;
             any unit, scale and place.
         region: One file a region, named by it: a cloud whose points lie on the reference, a .npy of

@@ -58,7 +58,7 @@ def studio(
     from nrdf.studio.model.session import Session
     from nrdf.studio.serving import open_server
 
-    categories = [entry.category for entry in list_models()]
+    categories = [entry.category for entry in list_models() if entry.category]
     if not categories:
         raise ModelError("there is no trained model in this installation: install nrdf again")
     kept = Session(session)

@@ -33,13 +33,13 @@ def teach(
     Args:
         reference: Cloud or mesh of the object that the regions are on: +X forward, +Y up. Needed.
         category: What the object is, in your own words: chair, car and plane have a trained model,
-            all others are served by registration. Needed.
+            all others are served by the general one. Needed.
         out: File to write; CATEGORY.yaml unless given.
         region: Region files, as `nrdf retrieve` takes them.
         kind: sand, polish, oil, paint, clean, inspect or custom; one a region, or one for all.
         unit: Of the reference's file, where it does not say.
-        model: Zoo name, weight file or run, or registration, which serves any category; the
-            category's unless given.
+        model: Zoo name, weight file or run, such as general or registration, which serve any
+            category; the category's own unless given.
         allow_unusual: Take a category that is nearly called like a known one.
         overwrite: Replace the file if there is one.
         schema: Print the JSON schema of knowledge files, for editors; with --out, write it.

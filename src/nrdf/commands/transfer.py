@@ -72,8 +72,8 @@ def transfer(
             more.
         out: Folder to write, job-NAME unless given, by the target's name; with several targets the
             folder of their folders.
-        model: Zoo name, weight file or run, or registration, which serves any category; what the
-            knowledge says, or the category's, unless given.
+        model: Zoo name, weight file or run, such as general or registration, which serve any
+            category; what the knowledge says, or the category's own, unless given.
         unit: Of the target's file, where it does not say.
         up: The target is a scan, to be cleaned and aligned first, as by `nrdf align`; direction in
             it that points up: x, y, z, -x, -y, -z, or 'x y z', or auto.

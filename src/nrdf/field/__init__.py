@@ -20,6 +20,7 @@ __all__ = ["PRESETS", "PRESET_GROUP", "Field", "Inverse", "build_field", "field_
 
 PRESETS: dict[str, str] = {
     "default": "nrdf.field.default:DefaultField",
+    "general": "nrdf.field.general:GeneralField",
     "paper": "nrdf.field.paper:PaperField",
     "registration": "nrdf.field.registration:RegistrationField",
 }

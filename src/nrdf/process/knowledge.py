@@ -115,8 +115,8 @@ class Knowledge(Quantities):
     category: Name
     """What the object is, in your own words; chair, car and plane have a trained model."""
     model: Name | None = None
-    """Model that finds the regions: a name in the zoo, or registration, which serves any category;
-    the category's own unless given, and registration where it has none."""
+    """Model that finds the regions: a name in the zoo, or one that serves any category (general,
+    registration); the category's own unless given, and general where it has none."""
     reference: Reference
     """The object that it was taught on."""
     allow_unusual: bool = False

@@ -235,8 +235,8 @@ def load_process(knowledge: str | Path, model: Model | None = None) -> ProcessTr
 
     Args:
         knowledge: path of the knowledge file.
-        model: the one that the knowledge names, or its category's, unless given; registration
-            where the category has none (`nrdf.process.model_choice`).
+        model: the one that the knowledge names, or its category's, unless given; the general
+            one where the category has none (`nrdf.process.model_choice`).
 
     Raises:
         ProcessError: knowledge is wrong somewhere; field and value are named.

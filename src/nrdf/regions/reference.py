@@ -14,6 +14,7 @@ import numpy as np
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION
 from nrdf.io.inputs import as_cloud
 from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
@@ -39,6 +40,8 @@ def surface_mapper(model: CloudEncoder, source: EncodedCloud) -> SurfaceMapper:
     """What maps the surface of an encoded cloud onto others by a model."""
     if model.preset == REGISTRATION:
         return RegistrationMapper(source)
+    if model.preset == GENERAL:
+        return RegistrationMapper(source, model)
     return FieldMapper(model, source)
 
 

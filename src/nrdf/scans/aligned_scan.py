@@ -11,6 +11,7 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import WORKING_POINTS, CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import Similarity, up_axis
@@ -112,12 +113,12 @@ def is_one_sided(symmetry: float) -> bool:
 
 
 def pose_scorer(model: CloudEncoder, examples: Sequence[PointCloud] = ()) -> PoseScorer:
-    """What scores poses by a model: by its field, or, for the model registration, by examples.
+    """What scores poses by a model: by its field, or, for one of every category, by examples.
 
     examples: in canonical orientation, instead of members of the category's family. Raises
     ModelError if there are none and the model has no family.
     """
-    if model.preset == REGISTRATION:
+    if model.preset in (GENERAL, REGISTRATION):
         return RegistrationPoseScorer(model, examples)
     return FieldPoseScorer(model, examples)
 

@@ -27,11 +27,13 @@ def evaluations() -> dict[str, Callable[..., Any]]:
     from nrdf_benchmark.commands.shape import shape
     from nrdf_benchmark.commands.speed import speed
     from nrdf_benchmark.commands.toolpaths import toolpaths
+    from nrdf_benchmark.commands.unseen import unseen
     from nrdf_benchmark.commands.warp import warp
 
     return {
         "bsrc": bsrc,
         "objects": objects,
+        "unseen": unseen,
         "families": families,
         "warp": warp,
         "scans": scans,

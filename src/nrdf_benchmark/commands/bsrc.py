@@ -48,7 +48,7 @@ def bsrc(
 
     Methods: copy, box, copy-normals, box-normals, box-mask, registration (nothing learned); ndf,
     ndf-energy, imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default
-    field).
+    field); general (the field for every category); registration-model.
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 

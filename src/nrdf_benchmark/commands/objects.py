@@ -52,8 +52,8 @@ def objects(
             the worst pairs.
         category: Only these categories.
         group: Categories that share parts, joined by "+": objects of one are found on the others'.
-        method: Methods to run: nrdf, nrdf-refined, registration, registration-model, box-mask,
-            box-normals, box, copy, copy-normals.
+        method: Methods to run: nrdf, nrdf-refined, general, registration, registration-model,
+            box-mask, box-normals, box, copy, copy-normals.
         model: Zoo name, weight file or run, for all objects.
         views: Cameras of each simulated scan of a target; 0 is the whole cloud, in its own frame.
         normals: Of whole clouds: estimated, as of a scan, or the meshes' own.

@@ -34,6 +34,8 @@ class Entry:
     description: str
     preset: str | None = None
     run: str | None = None
+    any_category: bool = False
+    """Whether the weights, the zoo's of the preset's name unless given, serve every category."""
 
     @property
     def is_learned(self) -> bool:
@@ -49,6 +51,7 @@ METHODS = {
     "box-mask": Entry("box, region as a mask"),
     "registration": Entry("smooth non-rigid registration with normals, region as a mask"),
     "registration-model": Entry("the same as the model of any category, absent regions left out"),
+    "general": Entry("the general field, then registration from there", "general", None, True),
     "ndf": Entry("NDF, nearest descriptor", "ndf", "ndf"),
     "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
     "imdc": Entry("IMDC, its inverse's points snapped", "imdc", "imdc"),
@@ -125,7 +128,7 @@ def _build(spec: MethodSpec) -> Method:
         return DescriptorSearch(model, energy=spec.name == "ndf-energy").match
     from nrdf_benchmark.methods.learned import FieldMethod
 
-    association = "mask" if spec.name in ("nrdf", "nrdf-refined") else "points"
+    association = "mask" if spec.name in ("nrdf", "nrdf-refined", "general") else "points"
     return FieldMethod(model, association, refine=spec.name == "nrdf-refined")
 
 
@@ -153,11 +156,14 @@ def _find_method(
 
     if name in chosen:
         path = find_weights(chosen[name])
+    elif entry.any_category:
+        path = find_weights(name)
     elif entry.run is None:
         path = find_weights(chosen.get("", category))
     else:
         path = _trained(name, entry, category, runs)
     metadata = read_metadata(path)
+    category = "" if entry.any_category else category
     for kind, wanted in (("category", category), ("preset", entry.preset)):
         if metadata.get(kind) != wanted:
             raise ModelError(

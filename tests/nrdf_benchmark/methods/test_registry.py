@@ -50,6 +50,13 @@ def test_the_default_field_comes_from_the_zoo_unless_a_model_is_given(tmp_path):
     assert [spec.weights.name for spec in only] == ["chair.safetensors", "a=b.safetensors"]
 
 
+def test_the_general_field_serves_every_category(tmp_path):
+    (spec,) = find_methods(["general"], "sofa")
+    assert spec.weights.name == "general.safetensors"
+    with pytest.raises(ModelError, match=r"needs weights of category '', but .* 'chair'"):
+        find_methods(["general"], "sofa", ["general=chair"])
+
+
 def test_rivals_come_from_the_runs_unless_a_model_is_given(tmp_path):
     trained = save(tmp_path / "runs" / "chair-imdc" / "weights.safetensors", "imdc")
     (spec,) = find_methods(["imdc"], "chair", runs=tmp_path / "runs", device="cuda")

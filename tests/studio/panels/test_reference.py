@@ -35,7 +35,7 @@ def test_bundled_knowledge_is_opened_with_its_regions(page):
     assert "8192 points" in tab.status.content
 
 
-def test_a_kind_without_a_model_is_served_by_registration(page, tmp_path):
+def test_a_kind_without_a_model_is_served_by_the_general_model(page, tmp_path):
     from nrdf.io.cloud import write_cloud
     from nrdf.studio.model.session_file import read_document, write_document
     from nrdf.studio.panels.reference import OTHER_KIND
@@ -53,11 +53,11 @@ def test_a_kind_without_a_model_is_served_by_registration(page, tmp_path):
     tab.kind.value = "helmet"
     page.does(tab._load, file)
     document = page.editor.document
-    assert (document.category, document.model) == ("helmet", "registration")
-    assert "by registration" in tab.status.content
+    assert (document.category, document.model) == ("helmet", "general")
+    assert "by the general model" in tab.status.content
     folder = page.editor.session.folder
     write_document(folder, document)
-    assert read_document(folder).model == "registration"
+    assert read_document(folder).model == "general"
 
 
 def test_knowledge_that_was_saved_is_opened_again(page):

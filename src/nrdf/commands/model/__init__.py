@@ -14,6 +14,7 @@ def model() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.model.add import add
     from nrdf.commands.model.boxes import boxes
     from nrdf.commands.model.correspond import correspond
+    from nrdf.commands.model.general import general
     from nrdf.commands.model.kind import kind
     from nrdf.commands.model.learn import learn
     from nrdf.commands.model.prepare import prepare
@@ -22,5 +23,5 @@ def model() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.model.train import train
     from nrdf.commands.model.yaw import yaw
 
-    every = (learn, synth, boxes, prepare, correspond, scan, train, yaw, kind, add)
+    every = (learn, synth, boxes, prepare, correspond, scan, train, general, yaw, kind, add)
     return {verb.__name__: verb for verb in every}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nrdf.bundled import KNOWLEDGE, REFERENCE
 from nrdf.errors import ProcessError
+from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION
 from nrdf.field.zoo import list_models
 from nrdf.geometry.units import METRES
@@ -41,7 +42,7 @@ class ReferenceTab:
         gui.add_markdown("Or a scan or mesh of your own:")
         self.category = gui.add_dropdown("Category", (*known, OTHER_KIND), initial_value=first)
         self.kind = gui.add_text("Its kind", "", visible=False)
-        self.model = gui.add_dropdown("Model", (OF_THE_CATEGORY, REGISTRATION))
+        self.model = gui.add_dropdown("Model", (OF_THE_CATEGORY, GENERAL, REGISTRATION))
         self.unit = gui.add_dropdown("Unit", (AS_IN_FILE, *METRES))
         self.upload = gui.add_upload_button(
             "Load a file …", mime_type=",".join(ENDINGS), hint=f"{', '.join(ENDINGS)}"
@@ -132,13 +133,14 @@ class ReferenceTab:
 
 def _about_model(document: Document) -> str:
     """What finds the regions where that is not the category's own model, in a sentence."""
-    if document.model != REGISTRATION:
+    if document.model not in (GENERAL, REGISTRATION):
         return ""
+    finds = "the general model" if document.model == GENERAL else "registration"
     if any(entry.category == document.category for entry in list_models()):
-        return "Regions are found by registration. "
+        return f"Regions are found by {finds}. "
     return (
         f"⚠ There is no model for the category '{document.category}': regions are found by "
-        "registration, which serves any kind. "
+        f"{finds}, which serves any kind. "
     )
 
 
