@@ -16,7 +16,18 @@ FEWEST_LINES, MOST_LINES, MOST_TEST_LINES = 40, 350, 500
 MOST_PUBLIC_NAMES = 30
 
 LAYERS = (
-    *("errors", "geometry", "io", "viz", "bundled", "shapes", "field", "training", "scans"),
+    *(
+        "errors",
+        "tasks",
+        "geometry",
+        "io",
+        "viz",
+        "bundled",
+        "shapes",
+        "field",
+        "training",
+        "scans",
+    ),
     *(
         "regions",
         "learn",

@@ -17,14 +17,14 @@ import numpy as np
 import torch
 
 import nrdf
-from nrdf.errors import ConfigError, DataError, NrdfError, OutputError, unknown_name
+from nrdf.errors import ConfigError, DataError, OutputError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud
 from nrdf.io.file_names import spreadsheet_text
 from nrdf.regions.model import Model
 from nrdf.shapes.dataset import Shape, read_shape, shape_paths
-from nrdf.shapes.pool import CRASHED, run_tasks
+from nrdf.tasks import TaskLost, Workers, run_tasks
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec
 from nrdf_benchmark.metrics import METRICS, MISSED, chamfer_l1
 
@@ -184,7 +184,7 @@ def evaluate_shapes(
     paths: Sequence[Path],
     specs: Sequence[MethodSpec],
     settings: Settings,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[ShapeResult]:
     """Score methods on shapes, on `workers` processes of one thread each.
@@ -196,7 +196,7 @@ def evaluate_shapes(
     tasks = [_Task(spec, path, category, settings) for spec in specs for path in paths]
     done: dict[tuple[str, Path], ShapeScore] = {}
     counts = dict.fromkeys((spec.name for spec in specs), 0)
-    with closing(run_tasks(_run, tasks, min(workers, len(tasks)))) as results:
+    with closing(run_tasks(_run, tasks, workers)) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)
@@ -224,9 +224,9 @@ def _model(spec: MethodSpec) -> Model:
 
 
 def _explained(task: _Task, error: Exception) -> Exception:
-    if isinstance(error, NrdfError) or str(error) != CRASHED:
+    if not isinstance(error, TaskLost):
         return error
-    return DataError(f"{task.spec.name}, {task.path.stem}: {CRASHED}; give fewer --workers")
+    return DataError(f"{task.spec.name}, {task.path.stem}: {error}; give fewer --workers")
 
 
 def table(results: Sequence[ShapeResult], category: str, settings: Settings) -> str:

@@ -350,8 +350,8 @@ def test_knowledge_that_is_wrong_is_so_at_once_for_all_targets(four, untrained, 
 def test_the_exit_code_is_the_worst(four, monkeypatch, errors, code):
     codes = iter(0 if e is None else getattr(e, "exit_code", 2) for e in errors)
 
-    def transferred(task, target, out):
-        return TransferOutcome(target, out, next(codes))
+    def transferred(task, pair):
+        return TransferOutcome(*pair, next(codes))
 
     monkeypatch.setattr("nrdf.serve.many.transfer_one", transferred)
     monkeypatch.setattr(ObjectTransfer, "process_transfer", None)

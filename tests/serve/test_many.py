@@ -9,7 +9,7 @@ import pytest
 
 from nrdf.errors import CloudError
 from nrdf.process.limits import Limits
-from nrdf.serve.many import TransferTask, made_from, transfer_one
+from nrdf.serve.many import TransferTask, failed, made_from, transfer_one
 from nrdf.serve.object_transfer import ObjectTransfer
 from nrdf.serve.scan_input import ScanOptions
 
@@ -40,28 +40,37 @@ def task(tmp_path, monkeypatch):
 def test_a_job_that_was_made_from_the_same_is_not_made_again(task, tmp_path):
     given, made = task
     target, folder = tmp_path / "a.ply", tmp_path / "out"
-    assert transfer_one(given, target, folder).exit_code == 0
-    again = transfer_one(given, target, folder)
+    assert transfer_one(given, (target, folder)).exit_code == 0
+    again = transfer_one(given, (target, folder))
     assert again.known and again.total == REPORT["total"] and made == ["a.ply"]
-    assert transfer_one(replace(given, strict=True), target, folder).reasons == ("odd",)
+    assert transfer_one(replace(given, strict=True), (target, folder)).reasons == ("odd",)
     target.write_text("changed")
-    refused = transfer_one(given, target, folder)
+    refused = transfer_one(given, (target, folder))
     assert refused.exit_code == 2 and "not empty" in refused.reasons[0]
-    assert transfer_one(replace(given, overwrite=True), target, folder).exit_code == 0
+    assert transfer_one(replace(given, overwrite=True), (target, folder)).exit_code == 0
     assert made == ["a.ply", "a.ply"]
     (folder / "report.json").write_text("{")
-    assert transfer_one(given, target, folder).exit_code == 2
+    assert transfer_one(given, (target, folder)).exit_code == 2
 
 
 def test_what_goes_wrong_is_that_objects_own(task, tmp_path, monkeypatch):
     given, _ = task
-    assert transfer_one(given, tmp_path / "none.ply", tmp_path / "x").exit_code == 2
+    assert transfer_one(given, (tmp_path / "none.ply", tmp_path / "x")).exit_code == 2
 
     def fails(self, target):
         raise CloudError("flat")
 
     monkeypatch.setattr(ObjectTransfer, "transfer", fails)
-    outcome = transfer_one(given, tmp_path / "a.ply", tmp_path / "x")
+    outcome = transfer_one(given, (tmp_path / "a.ply", tmp_path / "x"))
     assert outcome.reasons == ("flat",) and not (tmp_path / "x").exists()
     limits = made_from(replace(given, limits=Limits(min_coverage=0.5)), tmp_path / "a.ply")
     assert limits != made_from(given, tmp_path / "a.ply")
+
+
+def test_an_error_that_nobody_foresaw_is_raised(tmp_path):
+    pair = (tmp_path / "a", tmp_path / "b")
+    assert failed(pair, OSError(28, "No space left")).reasons == (
+        "the system refused: No space left",
+    )
+    with pytest.raises(ZeroDivisionError):
+        failed(pair, ZeroDivisionError())

@@ -18,6 +18,7 @@ class Metavar:
 
 File = Annotated[Path, Metavar("FILE")]
 Folder = Annotated[Path, Metavar("FOLDER")]
+Cluster = Annotated[str, Metavar("ADDRESS")]
 Sensors = Annotated[tuple[float, ...], Metavar("X Y Z ...")]
 Up = Annotated[str, Metavar("AXIS")]
 Unit = Literal["m", "cm", "mm", "in"]

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, errors, progress_bar, show, table
-from nrdf.commands.options import File, Folder, Metavar, Sensors, Skip, Unit, Up
-from nrdf.errors import ConfigError, NrdfError
+from nrdf.commands.options import Cluster, File, Folder, Metavar, Sensors, Skip, Unit, Up
+from nrdf.errors import ConfigError
 from nrdf.io.bounds import Bounds, Count, Fraction, NonNegative
+from nrdf.tasks import Workers, chosen_workers, run_tasks
 
 if TYPE_CHECKING:
     from nrdf.serve.many import TransferOutcome, TransferTask
@@ -46,8 +48,8 @@ def transfer(
     any_kind: bool = False,
     strict: bool = False,
     device: str = "cpu",
-    workers: Count = 1,
-    cluster: Annotated[str, Metavar("ADDRESS")] | None = None,
+    workers: Count | None = None,
+    cluster: Cluster | None = None,
     overwrite: bool = False,
 ) -> int:
     """Bring process knowledge to new objects, as tool paths.
@@ -98,7 +100,7 @@ def transfer(
         strict: Limit: nothing may be doubtful about the target's pose, unit and kind, and about
             its regions, absent ones included.
         device: cpu, cuda, cuda:N or auto.
-        workers: Processes that work on several targets; more than one need nrdf[cluster].
+        workers: Processes that work on several targets, one unless given; more need nrdf[cluster].
         cluster: Address of a Dask scheduler that does so instead: tcp://host:8786.
         overwrite: Replace an earlier result in the output folder.
     """
@@ -132,7 +134,9 @@ def transfer(
     task = TransferTask(
         knowledge, model, device, scan, min_confidence, limits, strict, overwrite, command_line()
     )
-    outcomes = _transfer_many(task, list(zip(target, folders, strict=True)), workers, cluster)
+    outcomes = _transfer_many(
+        task, list(zip(target, folders, strict=True)), chosen_workers(workers, cluster, 1)
+    )
     show_outcomes(outcomes)
     if out is not None and len(target) > 1:
         write_catalogue(out, outcomes, knowledge.stem)
@@ -141,25 +145,23 @@ def transfer(
 
 
 def _transfer_many(
-    task: TransferTask, pairs: list[tuple[Path, Path]], workers: int, cluster: str | None
+    task: TransferTask, pairs: list[tuple[Path, Path]], workers: Workers
 ) -> list[TransferOutcome]:
     """What becomes of each target, in their order; a line each as they come."""
-    from nrdf.serve.cluster import map_objects
-    from nrdf.serve.many import NO_RESULT, TransferOutcome, transfer_one
+    from nrdf.serve.many import failed, transfer_one
 
     task.objects.process_transfer  # noqa: B018  knowledge that is wrong is so for every target
-    found: dict[int, TransferOutcome] = {}
-    items = [(task, *pair) for pair in pairs]
+    found: dict[tuple[Path, Path], TransferOutcome] = {}
     with progress_bar("targets") as progress:
-        for index, came in map_objects(transfer_one, items, workers, cluster):
-            if isinstance(came, NrdfError):
-                came = TransferOutcome(*pairs[index], NO_RESULT, (str(came),))
-            found[index] = came
+        for pair, came in run_tasks(partial(transfer_one, task), pairs, workers):
+            if isinstance(came, Exception):
+                came = failed(pair, came)
+            found[pair] = came
             progress(len(found), len(pairs))
             style = None if came.exit_code == 0 else "yellow"
             for reason in came.reasons or ("made before" if came.known else "good",):
                 errors.print(f"{came.target}: {reason}", style=style)
-    return [found[index] for index in range(len(pairs))]
+    return [found[pair] for pair in pairs]
 
 
 def job_folders(targets: Sequence[Path], out: Path | None) -> list[Path]:

@@ -32,6 +32,7 @@ from nrdf.shapes.dataset import (
     write_index,
     write_shape,
 )
+from nrdf.tasks import Workers
 from nrdf.training.config import TrainConfig, load_config
 from nrdf.training.dataset import load_dataset
 from nrdf.training.loop import train
@@ -96,7 +97,7 @@ def learn(
     up: str = "y",
     forward: str | None = None,
     config: TrainConfig | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Learned:
     """Learn a kind of object from the files in `folder`.

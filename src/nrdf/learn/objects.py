@@ -25,7 +25,7 @@ from nrdf.io.formats.mesh_file import MESH_ENDINGS
 from nrdf.scans.clean import clean_scan
 from nrdf.shapes.dataset import Shape, read_shape, read_stamp, write_shape
 from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.pool import run_tasks
+from nrdf.tasks import Workers, run_tasks
 
 log = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ def read_objects(
     category: str,
     up: str,
     out: Path,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> ReadObjects:
     """Training shapes of `files` (which are in `folder`), turned so that +Y is up, not yet aligned.

@@ -86,10 +86,14 @@ def made_from(task: TransferTask, target: Path) -> dict[str, Any]:
     }
 
 
-def transfer_one(task: TransferTask, target: Path, folder: Path) -> TransferOutcome:
-    """Write the job folder of one object, unless it is there already. Raises nothing."""
+def transfer_one(task: TransferTask, pair: tuple[Path, Path]) -> TransferOutcome:
+    """Write the job folder of one object, unless it is there already.
+
+    pair: target and folder. Raises nothing that is foreseen.
+    """
     from nrdf.io.output import output_folder
 
+    target, folder = pair
     try:
         origin = made_from(task, target)
         known = _known(folder, origin)
@@ -103,11 +107,18 @@ def transfer_one(task: TransferTask, target: Path, folder: Path) -> TransferOutc
                 place, target, result, scan, task.limits, task.command, {MADE_FROM: origin}
             )
         return _judged(task, target, folder, report, False)
-    except NrdfError as error:
-        return TransferOutcome(target, folder, error.exit_code, tuple(str(error).splitlines()))
-    except OSError as error:
+    except (NrdfError, OSError) as error:
+        return failed(pair, error)
+
+
+def failed(pair: tuple[Path, Path], error: Exception) -> TransferOutcome:
+    """What became of an object where that was an error. Raises one that nobody foresaw."""
+    if isinstance(error, NrdfError):
+        return TransferOutcome(*pair, error.exit_code, tuple(str(error).splitlines()))
+    if isinstance(error, OSError):
         said = f"the system refused: {error.strerror or error}"
-        return TransferOutcome(target, folder, NO_RESULT, (said,))
+        return TransferOutcome(*pair, NO_RESULT, (said,))
+    raise error
 
 
 def _judged(

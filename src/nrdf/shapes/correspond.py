@@ -27,8 +27,8 @@ from nrdf.shapes.dataset import (
     shape_paths,
     write_shape,
 )
-from nrdf.shapes.pool import run_tasks
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
+from nrdf.tasks import Workers, run_tasks
 
 log = logging.getLogger(__name__)
 
@@ -52,7 +52,7 @@ class CorrespondReport:
 def correspond_folders(
     folders: list[Path],
     templates: int = 12,
-    workers: int = 1,
+    workers: Workers = 1,
     settings: RegistrationSettings | None = None,
     progress: Callable[[int, int], None] | None = None,
     templates_from: Path | None = None,

@@ -28,7 +28,7 @@ from nrdf.shapes.dataset import (
     write_shape,
 )
 from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.pool import run_tasks
+from nrdf.tasks import Workers, run_tasks
 
 MIN_ENCLOSED = 0.5  # share of the skin that must have an inside behind it
 _PROBE = 0.002  # canonical distance behind the skin at which the inside is looked for
@@ -73,7 +73,7 @@ def prepare_folder(
     category: str,
     index: Path | None = None,
     settings: PrepareSettings | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     overwrite: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> PrepareReport:

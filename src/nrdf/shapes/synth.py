@@ -20,7 +20,7 @@ from nrdf.shapes.dataset import (
 )
 from nrdf.shapes.families import SurfaceCoordinates, get_family
 from nrdf.shapes.occupancy import occupancy_queries
-from nrdf.shapes.pool import run_tasks
+from nrdf.tasks import Workers, run_tasks
 
 SURFACE_POINTS = 8192
 QUERIES = 16384
@@ -33,7 +33,7 @@ def synthesise(
     count: int,
     out: Path,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write `count` members of a family as training shapes into the folder `out`.

@@ -20,6 +20,7 @@ from nrdf.field.zoo import WEIGHTS
 from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.families import get_family
+from nrdf.tasks import Workers
 from nrdf.training.batch import seeded
 from nrdf.training.dataset import ShapeDataset
 from nrdf.training.losses import LOSSES, LossContext
@@ -57,7 +58,7 @@ def benchmark_scores(
     benchmark: Benchmark,
     run: Path,
     device: str = "cpu",
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> dict[str, float]:
     """Mean CD-L1 of every region over BSRC's ordered pairs, by eq. 9, of a trained run.

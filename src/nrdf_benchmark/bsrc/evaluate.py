@@ -10,8 +10,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from nrdf.errors import DataError, NrdfError
-from nrdf.shapes.pool import CRASHED, run_tasks
+from nrdf.errors import DataError
+from nrdf.tasks import TaskLost, Workers, run_tasks
 from nrdf_benchmark.bsrc.dataset import Benchmark, BenchmarkObject
 from nrdf_benchmark.methods.registry import Method, MethodSpec, build_method
 from nrdf_benchmark.metrics import score
@@ -72,7 +72,7 @@ class _Task:
 def evaluate(
     benchmark: Benchmark,
     specs: Sequence[MethodSpec],
-    workers: int = 1,
+    workers: Workers = 1,
     cache: PairCache | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[MethodResult]:
@@ -80,7 +80,7 @@ def evaluate(
 
     With one worker everything runs in this process. Pairs that `cache` has are not run again, and
     each one that is done is added to it. `progress` is told (method, pairs done, all). Raises
-    whatever a method raises, and DataError if a process dies.
+    whatever a method raises, and DataError for a pair whose processes die.
     """
     done: dict[tuple[str, str, str], PairResult] = {}
     tasks = []
@@ -97,7 +97,7 @@ def evaluate(
     tell = progress or (lambda *_: None)
     for name, count in counts.items():
         tell(name, count, total)
-    with closing(run_tasks(_run, tasks, min(workers, len(tasks)))) as results:
+    with closing(run_tasks(_run, tasks, workers)) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)
@@ -143,10 +143,10 @@ def _known(item: BenchmarkObject) -> BenchmarkObject:
 
 
 def _explained(task: _Task, error: Exception) -> Exception:
-    if isinstance(error, NrdfError) or str(error) != CRASHED:
+    if not isinstance(error, TaskLost):
         return error
     pair = f"{task.reference.name} to {task.target.name}"
-    return DataError(f"{task.spec.name}, {pair}: {CRASHED}; give fewer --workers")
+    return DataError(f"{task.spec.name}, {pair}: {error}; give fewer --workers")
 
 
 def _mean(values: np.ndarray) -> float:

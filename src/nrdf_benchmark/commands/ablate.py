@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Literal
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, progress_bar, versions
-from nrdf.commands.options import File, Folder
+from nrdf.commands.options import Cluster, File, Folder
 from nrdf.io.bounds import Count
+from nrdf.tasks import chosen_workers
 
 Variant = Literal["complete", "cd", "emd", "ncd", "ds", "dd"]
 
@@ -26,6 +26,7 @@ def ablate(
     pairs: Count = 20,
     device: str = "auto",
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     out: Folder | None = None,
     overwrite: bool = False,
 ) -> None:
@@ -57,6 +58,7 @@ def ablate(
         pairs: Pairs of parametric shapes, without --bsrc.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
         workers: Processes that score on BSRC; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do so instead.
         out: Folder of the runs and the table; runs/ablate-CATEGORY unless given.
         overwrite: Train anew what the folder holds of these variants and the shared stages.
     """
@@ -72,7 +74,7 @@ def ablate(
 
     out = out or Path("runs") / f"ablate-{category}"
     settings = load_config(config or ablation.SCHEDULES[schedule])
-    chosen, cores = choose_device(device), workers or os.cpu_count() or 1
+    chosen, cores = choose_device(device), chosen_workers(workers, cluster)
     # Read before anything is trained: what is wrong with it should not show hours later.
     if bsrc is not None:
         benchmark = read_bsrc(bsrc, category, labels)

@@ -15,9 +15,10 @@ from nrdf.commands.console import (
     table,
     versions,
 )
-from nrdf.commands.options import Folder
+from nrdf.commands.options import Cluster, Folder
 from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count
+from nrdf.tasks import chosen_workers
 
 if TYPE_CHECKING:
     from nrdf_benchmark.bsrc.dataset import Benchmark
@@ -36,6 +37,7 @@ def bsrc(
     metric: str = "cd-l1",
     device: str = "cpu",
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     overwrite: bool = False,
 ) -> None:
     """The paper's Table II: regions found on the benchmark's scans.
@@ -65,6 +67,7 @@ def bsrc(
             precision, recall, iou or side-accuracy.
         device: cpu, cuda, cuda:N or auto, of learned methods.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
         overwrite: Start anew, whatever is in the folder.
     """
     from nrdf.errors import ConfigError, unknown_name
@@ -80,10 +83,10 @@ def bsrc(
     specs = find_methods(method, category, model, runs, device)
     with errors.status("reading the benchmark"):
         benchmark = read_bsrc(data, category, labels)
-    workers = workers or os.cpu_count() or 1
+    count = chosen_workers(workers, cluster)
     cache = None if out is None else PairCache(out, overwrite)
     with progress_bars(method) as progress:
-        results = evaluate(benchmark, specs, workers, cache, progress)
+        results = evaluate(benchmark, specs, count, cache, progress)
     _show_table(results, benchmark, metric)
     if out is None:
         return
@@ -94,7 +97,7 @@ def bsrc(
         "versions": versions(),
         "commit": git_commit(),
         "cores": os.cpu_count(),
-        "workers": workers,
+        "workers": count,
         "command": command_line(),
     }
     written = write_results(results, benchmark, metric, out, origin)

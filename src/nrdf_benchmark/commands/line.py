@@ -39,12 +39,14 @@ def line(
     """
     from nrdf.errors import OutputError
     from nrdf.io.atomic import write_json
-    from nrdf_benchmark.line import kill_runs, measure_line, write_inbox
+    from nrdf_benchmark.line.kills import kill_runs
+    from nrdf_benchmark.line.objects import write_meshes
+    from nrdf_benchmark.line.speed import measure_line
 
     if out.exists():
         raise OutputError(f"{out} is there already; give a new folder")
     inbox = out / "inbox"
-    write_inbox(inbox, data, list(category), count, seed)
+    write_meshes(inbox, data, list(category), count, seed)
     shown = table(
         "", "workers", "objects", "a minute", "a core minute", "memory, MB", "growth, %",
         "done", "look-at", "refused",

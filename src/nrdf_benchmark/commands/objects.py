@@ -14,9 +14,10 @@ from nrdf.commands.console import (
     table,
     versions,
 )
-from nrdf.commands.options import Folder
+from nrdf.commands.options import Cluster, Folder
 from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Bounds, Count, NonNegativeCount
+from nrdf.tasks import chosen_workers
 
 
 @lock_output("out")
@@ -34,6 +35,7 @@ def objects(
     jobs: NonNegativeCount = 30,
     device: str = "cpu",
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     overwrite: bool = False,
 ) -> None:
     """Parts of real objects: labelled on one mesh, found on every other.
@@ -62,6 +64,7 @@ def objects(
         jobs: Pairs, drawn at random, that go from a mesh file to robot programs; 0 for none.
         device: cpu, cuda, cuda:N or auto.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
         overwrite: Start anew, whatever is in the folder.
     """
     from nrdf.errors import DataError
@@ -91,7 +94,7 @@ def objects(
         raise DataError(f"{data}: no two objects of a category; nothing can be compared")
     settings = Settings(data.resolve(), path.resolve(), points, normals, device)
     cache = None if out is None else LineCache(out, overwrite)
-    count = workers or os.cpu_count() or 1
+    count = chosen_workers(workers, cluster)
     chosen = draw_pairs(all_pairs, jobs)
     with progress_bars([*method, *[JOBS] * bool(chosen)]) as progress:
         results = evaluate_objects(settings, found, all_pairs, specs, views, count, cache, progress)

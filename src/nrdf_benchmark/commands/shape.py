@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
 from nrdf.commands.console import command_line, console, progress_bars, versions
-from nrdf.commands.options import Folder
+from nrdf.commands.options import Cluster, Folder
 from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Bounds, Count, Fraction
+from nrdf.tasks import chosen_workers
 
 
 @lock_output("out")
@@ -24,6 +24,7 @@ def shape(
     points: Count = 8192,
     device: str = "cpu",
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     out: Folder | None = None,
 ) -> None:
     """The paper's Table I: surface and occupancy of shapes not trained on.
@@ -45,6 +46,7 @@ def shape(
         points: Points drawn on the surface, and taken of the cloud.
         device: cpu, cuda, cuda:N or auto.
         workers: Processes; all cores unless given, one on a GPU.
+        cluster: Address of a Dask scheduler whose workers do it instead.
         out: Folder for the table (Markdown), and every shape's figures (CSV, JSON).
     """
     from nrdf.training.provenance import git_commit
@@ -62,7 +64,7 @@ def shape(
     category, paths = find_shapes(data, split)
     specs = find_methods(method, category, model, runs, device)
     settings = Settings(level, resolution, points)
-    cores = workers or (os.cpu_count() or 1 if device == "cpu" else 1)
+    cores = chosen_workers(workers, cluster, None if device == "cpu" else 1)
     with progress_bars(method) as progress:
         results = evaluate_shapes(category, paths, specs, settings, cores, progress)
     if out is not None:

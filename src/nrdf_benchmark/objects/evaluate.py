@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from nrdf.errors import DataError, NrdfError
-from nrdf.shapes.pool import CRASHED, run_tasks
+from nrdf.tasks import TaskLost, Workers, run_tasks
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.objects.dataset import LABELS, LabelledMesh
 from nrdf_benchmark.objects.jobs import JobResult, run_job
@@ -75,7 +75,7 @@ def evaluate_objects(
     pairs: Sequence[tuple[str, str]],
     specs: Sequence[MethodSpec],
     views: Sequence[int] = (WHOLE,),
-    workers: int = 1,
+    workers: Workers = 1,
     cache: LineCache | None = None,
     progress: Progress | None = None,
 ) -> list[ObjectPairResult]:
@@ -94,7 +94,7 @@ def evaluate_jobs(
     settings: Settings,
     objects: Sequence[LabelledMesh],
     pairs: Sequence[tuple[str, str]],
-    workers: int = 1,
+    workers: Workers = 1,
     cache: LineCache | None = None,
     progress: Progress | None = None,
 ) -> list[JobResult]:
@@ -109,7 +109,7 @@ def _resumed(
     parse: Callable[[dict[str, Any]], Result | None],
     sources: tuple[str, ...],
     objects: Sequence[LabelledMesh],
-    workers: int,
+    workers: Workers,
     cache: LineCache | None,
     progress: Progress | None,
 ) -> list[Result]:
@@ -131,7 +131,7 @@ def _resumed(
             log.info("%s: %d of %d pairs were there already", name, count, totals[name])
         tell(name, count, totals[name])
     todo = [task for task in tasks if task not in done]
-    with closing(run_tasks(run, todo, min(workers, len(todo)))) as results:
+    with closing(run_tasks(run, todo, workers)) as results:
         for task, result in results:
             if isinstance(result, Exception):
                 raise _explained(task, result)
@@ -194,8 +194,5 @@ def _parse_job(content: dict[str, Any]) -> JobResult | None:
 
 def _explained(task: _Task, error: Exception) -> Exception:
     pair = f"{task.name}, {task.reference} to {task.target}"
-    if isinstance(error, NrdfError):
-        return DataError(f"{pair}: {error}")
-    if str(error) == CRASHED:
-        return DataError(f"{pair}: {CRASHED}; give fewer --workers")
-    return error
+    hint = "; give fewer --workers" if isinstance(error, TaskLost) else ""
+    return DataError(f"{pair}: {error}{hint}") if isinstance(error, NrdfError) else error

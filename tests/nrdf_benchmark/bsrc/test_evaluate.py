@@ -7,7 +7,7 @@ import pytest
 
 from builders.bsrc_folder import member_clouds, write_bsrc
 from nrdf.errors import DataError
-from nrdf.shapes.pool import CRASHED
+from nrdf.tasks import TaskLost
 from nrdf_benchmark.bsrc import evaluate as module
 from nrdf_benchmark.bsrc.dataset import ROIS, read_bsrc
 from nrdf_benchmark.bsrc.evaluate import MethodResult, evaluate, run_pair
@@ -141,6 +141,6 @@ def test_what_a_method_raises_is_raised(benchmark, monkeypatch):
     monkeypatch.setattr(module, "run_pair", fail(ValueError("broken")))
     with pytest.raises(ValueError, match="broken"):
         evaluate(benchmark, [COPY])
-    monkeypatch.setattr(module, "run_pair", fail(RuntimeError(CRASHED)))
+    monkeypatch.setattr(module, "run_pair", fail(TaskLost()))
     with pytest.raises(DataError, match=r"copy, chair1 to chair2: the process .* fewer --workers"):
         evaluate(benchmark, [COPY])

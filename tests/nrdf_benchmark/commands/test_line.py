@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 
 from nrdf import cli
-from nrdf_benchmark import line as measured
-from nrdf_benchmark.line import LineSpeed
+from nrdf_benchmark.line import kills, objects, speed
+from nrdf_benchmark.line.speed import LineSpeed
 
 
 def test_the_command_writes_what_it_shows_into_a_new_folder(tmp_path, monkeypatch, capsys):
-    def write_inbox(folder, *_):
+    def write_meshes(folder, *_):
         folder.mkdir(parents=True)
 
-    monkeypatch.setattr(measured, "write_inbox", write_inbox)
-    speed = LineSpeed(1, {"done": 2}, 60.0, (2.0, 4.0), (100.0, 100.0))
-    monkeypatch.setattr(measured, "measure_line", lambda *_: speed)
-    monkeypatch.setattr(measured, "kill_runs", lambda *_: {"kills": 3, "lost": 0})
+    monkeypatch.setattr(objects, "write_meshes", write_meshes)
+    measured = LineSpeed(1, {"done": 2}, 60.0, (2.0, 4.0), (100.0, 100.0))
+    monkeypatch.setattr(speed, "measure_line", lambda *_: measured)
+    monkeypatch.setattr(kills, "kill_runs", lambda *_: {"kills": 3, "lost": 0})
     words = ["eval", "line", "--data", "x", "--cell", "c.yaml", "--out", str(tmp_path / "new")]
     assert cli.run([*words, "--workers", "1", "--kills", "3"]) == 0
     content = json.loads((tmp_path / "new" / "line.json").read_text())

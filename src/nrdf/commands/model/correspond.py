@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, progress_bar
-from nrdf.commands.options import Folder
+from nrdf.commands.options import Cluster, Folder
 from nrdf.commands.output_lock import lock_output
 from nrdf.io.bounds import Count
+from nrdf.tasks import chosen_workers
 
 
 @lock_output("data")
@@ -19,6 +18,7 @@ def correspond(
     templates_from: Folder | None = None,
     meshes: Folder | None = None,
     workers: Count | None = None,
+    cluster: Cluster | None = None,
 ) -> None:
     """Add correspondences between shapes, by registering templates.
 
@@ -35,6 +35,7 @@ def correspond(
         meshes: Folder of the meshes that the first data folder was prepared from: those that share
             their triangulation get exact correspondences too, vertex by vertex.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
     """
     from nrdf.errors import ConfigError
     from nrdf.shapes.correspond import correspond_folders
@@ -45,7 +46,7 @@ def correspond(
     if meshes is not None:
         for name, shapes in add_shared_topology(meshes.iterdir(), data[0]).items():
             console.print(f"{len(shapes)} shapes share their triangulation: group {name}")
-    cores = workers or os.cpu_count() or 1
+    cores = chosen_workers(workers, cluster)
     with progress_bar("shapes registered") as progress:
         report = correspond_folders(list(data), templates, cores, None, progress, templates_from)
     console.print(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional
 
 from nrdf.commands.console import command_line, console, progress_bar, show, table
-from nrdf.commands.options import Axis, Folder, Metavar
+from nrdf.commands.options import Axis, Cluster, Folder, Metavar
 from nrdf.io.bounds import Count
+from nrdf.tasks import chosen_workers
 
 if TYPE_CHECKING:
     from nrdf.learn.learning import Learned, Progress
@@ -30,6 +30,7 @@ def learn(
     out: Folder | None = None,
     steps: Count | None = None,
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     no_install: bool = False,
     overwrite: bool = False,
 ) -> None:
@@ -51,6 +52,7 @@ def learn(
         out: Folder of all that is made; runs/CATEGORY-learned unless given.
         steps: Steps of training, 0.2 s each; 1200 unless given.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
         no_install: Leave your zoo as it is.
         overwrite: Begin anew.
     """
@@ -68,7 +70,7 @@ def learn(
     if steps is not None:
         stage = config.stages[0].model_copy(update={"steps": steps})
         config = config.model_copy(update={"stages": [stage]})
-    cores, started = workers or os.cpu_count() or 1, time.monotonic()
+    cores, started = chosen_workers(workers, cluster), time.monotonic()
     with write_lock(place):
         if overwrite:
             _forget(place)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, errors, progress_bar
-from nrdf.commands.options import File, Folder
+from nrdf.commands.options import Cluster, File, Folder
 from nrdf.io.bounds import Count, Seed
+from nrdf.tasks import chosen_workers
 
 
 def prepare(
@@ -21,6 +21,7 @@ def prepare(
     queries: Count = 16384,
     seed: Seed = 0,
     workers: Count | None = None,
+    cluster: Cluster | None = None,
     overwrite: bool = False,
 ) -> int:
     """Make training shapes from meshes of any quality.
@@ -41,13 +42,14 @@ def prepare(
         queries: Occupancy queries of each shape, half of them near the surface.
         seed: Seed of the points and queries.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
         overwrite: Make again what is there already.
     """
     from nrdf.io.locks import write_lock
     from nrdf.shapes.prepare import PrepareSettings, prepare_folder
 
     settings = PrepareSettings(surface_points, queries, seed)
-    folder, cores = out or Path("data") / category, workers or os.cpu_count() or 1
+    folder, cores = out or Path("data") / category, chosen_workers(workers, cluster)
     with write_lock(folder), progress_bar("meshes") as progress:
         report = prepare_folder(
             meshes, folder, category, index, settings, cores, overwrite, progress

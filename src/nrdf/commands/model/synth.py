@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from tyro.conf import Positional
 
 from nrdf.commands.console import console, progress_bar
-from nrdf.commands.options import Folder
+from nrdf.commands.options import Cluster, Folder
 from nrdf.io.bounds import Count, Seed
+from nrdf.tasks import chosen_workers
 
 
 def synth(
@@ -18,6 +18,7 @@ def synth(
     out: Folder | None = None,
     seed: Seed = 0,
     workers: Count | None = None,
+    cluster: Cluster | None = None,
 ) -> None:
     """Make parametric training shapes: chair, car, plane or table.
 
@@ -32,11 +33,12 @@ def synth(
         out: Data folder to write or to go on with; data/CATEGORY-family unless given.
         seed: Seed of the first shape; shape i has the seed seed + i.
         workers: Processes; all cores unless given.
+        cluster: Address of a Dask scheduler whose workers do it instead.
     """
     from nrdf.io.locks import write_lock
     from nrdf.shapes.synth import synthesise
 
     folder = out or Path("data") / f"{category}-family"
     with write_lock(folder), progress_bar(f"{category} shapes") as progress:
-        made = synthesise(category, count, folder, seed, workers or os.cpu_count() or 1, progress)
+        made = synthesise(category, count, folder, seed, chosen_workers(workers, cluster), progress)
     console.print(f"{made} shapes made, {count - made} were there already, in {folder}")

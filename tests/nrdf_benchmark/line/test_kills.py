@@ -1,12 +1,10 @@
-"""What the benchmark of the line counts."""
+"""What `kill -9` costs, counted."""
 
 from __future__ import annotations
 
 import json
 
-import pytest
-
-from nrdf_benchmark.line import LineSpeed, check_outbox
+from nrdf_benchmark.line.kills import check_outbox
 
 
 def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
@@ -24,10 +22,3 @@ def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
         if said:
             (out / outcome / folder / "object.json").write_text(json.dumps(said))
     assert check_outbox(inbox, out) == {"objects": 3, "lost": 1, "twice": 1, "halves": 2}
-
-
-def test_speed_and_growth():
-    resident = (*[500.0] * 10, *[1000.0] * 80, *[1050.0] * 10)
-    speed = LineSpeed(2, {"done": 100}, 120.0, (3.0,) * 100, resident)
-    assert speed.per_minute == 50.0 and speed.per_core_minute == 20.0
-    assert speed.memory_growth == pytest.approx(0.05)
