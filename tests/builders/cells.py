@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from nrdf.cell.file import validated_cell
+from nrdf.cell.file import CELL_FILE
 from nrdf.cell.work_cell import WorkCell
 
 BASE = {
@@ -49,4 +49,4 @@ def cell_content(**changes: Any) -> dict[str, Any]:
 
 def cell_of(**changes: Any) -> WorkCell:
     """A cell."""
-    return validated_cell(cell_content(**changes), "cell.yaml")
+    return CELL_FILE.validated(cell_content(**changes), "cell.yaml")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from nrdf.process.knowledge_file import parse_knowledge
+from nrdf.process.knowledge_file import KNOWLEDGE_FILE
 
 SAND = {"kind": "sand", "stepover_mm": 15, "tool": {"radius_mm": 25}, "feed_mm_s": 100}
 TAUGHT = {**SAND, "trajectory": "taught", "waypoints": [{"positions_m": [[0, 0, 0], [1, 0, 0]]}]}
@@ -22,4 +22,4 @@ def content(process=SAND, region=(("indices", [1, 2]),), **changes):
 
 
 def parsed(**changes):
-    return parse_knowledge(json.dumps(content(**changes)), "k.yaml", as_json=True)
+    return KNOWLEDGE_FILE.parse(json.dumps(content(**changes)), "k.yaml", as_json=True)

@@ -8,9 +8,8 @@ import pytest
 
 from builders.knowledge import SAND, TAUGHT, content, parsed
 from nrdf.errors import ProcessError
-from nrdf.process import knowledge_file
 from nrdf.process.knowledge_file import (
-    parse_knowledge,
+    KNOWLEDGE_FILE,
     read_knowledge,
     write_knowledge,
 )
@@ -49,7 +48,7 @@ def test_numbers_with_exponents_and_anchors_are_read_as_meant():
               - &sand {kind: sand, stepover_m: 15e-3, tool: {radius_m: .25e-1}, feed_m_s: 1e-1}
               - {<<: *sand, kind: oil}
     """
-    sand, oil = parse_knowledge(text, "k").regions[0].processes
+    sand, oil = KNOWLEDGE_FILE.parse(text, "k").regions[0].processes
     assert (sand.stepover_m, sand.tool.radius_m, sand.feed_m_s) == (0.015, 0.025, 0.1)
     assert oil.kind == "oil" and oil.stepover_m == 0.015
 
@@ -67,7 +66,7 @@ def test_numbers_with_exponents_and_anchors_are_read_as_meant():
 )  # fmt: skip
 def test_yaml_that_is_broken_or_hostile_is_refused(text, message):
     with pytest.raises(ProcessError) as caught:
-        parse_knowledge(text, "k.yaml")
+        KNOWLEDGE_FILE.parse(text, "k.yaml")
     assert message in str(caught.value)
 
 
@@ -80,13 +79,6 @@ def test_a_missing_file_and_one_that_is_no_text(tmp_path):
     (tmp_path / "cut.json").write_text('{"version": 1, ')
     with pytest.raises(ProcessError, match="not valid JSON"):
         read_knowledge(tmp_path / "cut.json")
-
-
-def test_a_large_file_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(knowledge_file, "_LARGEST_FILE", 10)
-    (tmp_path / "k.yaml").write_text("category: chair")
-    with pytest.raises(ProcessError, match="has more than"):
-        read_knowledge(tmp_path / "k.yaml")
 
 
 @pytest.mark.parametrize("ending", ["yaml", "json"])
@@ -111,7 +103,7 @@ def test_what_is_written_is_read_again(tmp_path, ending, explained):
 
 def test_the_file_in_the_documentation_is_right():
     text = (Path(__file__).parents[2] / "docs" / "guides" / "teach.md").read_text(encoding="utf-8")
-    (region,) = parse_knowledge(text.split("```yaml\n")[1].split("```")[0], "docs").regions
+    (region,) = KNOWLEDGE_FILE.parse(text.split("```yaml\n")[1].split("```")[0], "docs").regions
     assert [process.kind for process in region.processes] == ["sand", "oil"]
     fields = set(Process.model_fields) - {"label"}
     assert all(f"`{field}`" in text for field in fields), "docs/guides/teach.md leaves out a field"

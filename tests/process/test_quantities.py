@@ -9,9 +9,7 @@ import pytest
 from builders.knowledge import SAND, content, parsed
 from nrdf.errors import ProcessError
 from nrdf.process.knowledge import Knowledge
-from nrdf.process.knowledge_file import (
-    validated,
-)
+from nrdf.process.knowledge_file import KNOWLEDGE_FILE
 
 
 def test_people_may_use_millimetres_degrees_and_rpm():
@@ -35,7 +33,7 @@ def test_people_may_use_millimetres_degrees_and_rpm():
 )
 def test_parameters_are_what_every_file_can_hold(parameters, message):
     with pytest.raises(ProcessError, match=message):
-        validated(content(process={**SAND, "parameters": parameters}), "k")
+        KNOWLEDGE_FILE.validated(content(process={**SAND, "parameters": parameters}), "k")
 
 
 @pytest.mark.parametrize("name", ["", "a\0b", "\ud800", "a" * 5000])

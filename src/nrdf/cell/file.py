@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from nrdf.cell.work_cell import VERSION, WorkCell
-from nrdf.errors import ProcessError
 from nrdf.io.atomic import write_atomically
-from nrdf.io.files import read_file
-from nrdf.io.schema import Location, validation_messages
-from nrdf.io.yaml_json import read_yaml
-from nrdf.process.knowledge_file import listed, read_knowledge
+from nrdf.io.model_file import ModelFile
+from nrdf.io.schema import Location
+from nrdf.process.knowledge_file import read_knowledge
 from nrdf.process.knowledge_text import model_lines
 
 HEADER = """\
@@ -31,40 +27,31 @@ HEADER = """\
 #        on: {krl: ["PULSE_GUN(TRUE)"]}, off: {krl: ["PULSE_GUN(FALSE)"]}}
 # A box to keep out of: {name: fence, centre_m: [0, -1.2, 1], size_m: [3, 0.1, 2]}
 """
-_LARGEST_FILE = 1 << 24
-_MOST_FAULTS = 12
 _EXAMPLE_TCP_M = (0.0, 0.0, 0.15)
 
 
+def _place(location: Location, content: dict[str, Any]) -> str:
+    """Where in a cell file: "tools, 'gun': tcp_m"."""
+    words = [str(part) for part in location]
+    if len(location) >= 2 and isinstance(location[1], int):
+        try:
+            item = content[str(location[0])][location[1]]
+            named = item.get("name", item.get("file"))
+            words[1] = f"'{named}'" if isinstance(named, str) else str(location[1] + 1)
+        except (KeyError, IndexError, TypeError, AttributeError):
+            words[1] = str(location[1] + 1)
+    return ".".join(words)
+
+
+CELL_FILE = ModelFile(
+    WorkCell, "cell", "nrdf cell new", "name: …, object: …, tools: …", VERSION, 1 << 24, _place
+)
+"""How cell files are read."""
+
+
 def read_cell(path: str | Path) -> WorkCell:
-    """The cell of a YAML file.
-
-    Raises ProcessError for a file that is missing, no YAML mapping, of another version, or wrong
-    somewhere: every fault is listed with its field, its value and, for an unknown key, the nearest
-    known one.
-    """
-    path = Path(path)
-    if not path.exists():
-        raise ProcessError(f"no cell file {path}; `nrdf cell new` writes one")
-    try:
-        content = read_yaml(read_file(path, ProcessError, _LARGEST_FILE).decode("utf-8-sig"))
-    except ValueError as error:  # UnicodeDecodeError is one
-        raise ProcessError(f"{path} is not valid YAML: {error}") from None
-    if not isinstance(content, dict):
-        raise ProcessError(f"{path} must hold a mapping (name: …, object: …, tools: …)")
-    version = content.get("version", VERSION)
-    if isinstance(version, int) and version != VERSION:
-        raise ProcessError(f"{path} has version {version}; this nrdf reads version {VERSION}")
-    return validated_cell(content, str(path))
-
-
-def validated_cell(content: dict[str, Any], origin: str) -> WorkCell:
-    """A cell from a mapping as a file holds it. Raises ProcessError listing every fault."""
-    try:
-        return WorkCell.model_validate(content)
-    except ValidationError as error:
-        faults = validation_messages(error, WorkCell, lambda at: _place(at, content), _MOST_FAULTS)
-        raise ProcessError(listed(origin, faults, error.error_count())) from None
+    """The cell of a file. Raises ProcessError, as `ModelFile.read` does."""
+    return CELL_FILE.read(path)
 
 
 def new_cell(
@@ -93,23 +80,10 @@ def new_cell(
         "programs": {"formats": list(formats)},
         "knowledge": rules,
     }
-    return validated_cell(content, "the new file")
+    return CELL_FILE.validated(content, "the new file")
 
 
 def write_cell(path: Path, cell: WorkCell) -> None:
     """Write a cell file, every field once with what it means. Raises OutputError."""
     text = HEADER + "\n".join(model_lines(cell, explained=True)) + "\n"
     write_atomically(path, [text.encode()])
-
-
-def _place(location: Location, content: dict[str, Any]) -> str:
-    """Where in a cell file: "tools, 'gun': tcp_m"."""
-    words = [str(part) for part in location]
-    if len(location) >= 2 and isinstance(location[1], int):
-        try:
-            item = content[str(location[0])][location[1]]
-            named = item.get("name", item.get("file"))
-            words[1] = f"'{named}'" if isinstance(named, str) else str(location[1] + 1)
-        except (KeyError, IndexError, TypeError, AttributeError):
-            words[1] = str(location[1] + 1)
-    return ".".join(words)

@@ -71,7 +71,7 @@ def check(file: Positional[File], without_robot: bool = False) -> None:
     from nrdf.errors import ProcessError
     from nrdf.export.options import options_of_cell
     from nrdf.export.registry import check_formats
-    from nrdf.process.knowledge_file import listed
+    from nrdf.io.model_file import listed
 
     said = read_cell(file)
     check_formats(said.programs.formats)

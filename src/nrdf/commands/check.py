@@ -31,9 +31,9 @@ def check(file: Positional[File], model: str | None = None) -> None:
             unless given.
     """
     from nrdf.errors import ProcessError
+    from nrdf.io.model_file import listed
     from nrdf.process.bound_knowledge import read_bound_knowledge
     from nrdf.process.check import check_knowledge
-    from nrdf.process.knowledge_file import listed
     from nrdf.process.model_choice import choose_model
 
     bound = read_bound_knowledge(file)

@@ -14,8 +14,9 @@ from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.geometry.units import METRES, USUAL_SIZES, guess_unit
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.io.files import open_file, sha256_of
+from nrdf.io.model_file import listed
 from nrdf.process.knowledge import Knowledge, Reference, Region
-from nrdf.process.knowledge_file import listed, read_knowledge
+from nrdf.process.knowledge_file import read_knowledge
 from nrdf.regions.files import read_region_file
 from nrdf.regions.region import region_indices
 

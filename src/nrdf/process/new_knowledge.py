@@ -13,7 +13,7 @@ from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.io.cloud import check_cloud, read_cloud
 from nrdf.process.bound_knowledge import checksum, known_unit, overlaps, resolve
 from nrdf.process.knowledge import Knowledge
-from nrdf.process.knowledge_file import validated
+from nrdf.process.knowledge_file import KNOWLEDGE_FILE
 from nrdf.process.model_choice import choose_model
 from nrdf.process.process import Kind
 from nrdf.regions.files import read_regions
@@ -119,7 +119,7 @@ def new_knowledge(
             for row, kind in zip(rows, every, strict=True)
         ],
     }
-    knowledge = validated(content, "the new file")
+    knowledge = KNOWLEDGE_FILE.validated(content, "the new file")
     if regions:
         bound_knowledge = resolve(
             knowledge.model_copy(update={"allow_overlap": True}), folder, "the new file"

@@ -23,7 +23,7 @@ from nrdf.export.registry import export_job
 from nrdf.io.atomic import write_atomically
 from nrdf.io.cloud import PointCloud, read_cloud
 from nrdf.process.bound_knowledge import BoundKnowledge
-from nrdf.process.knowledge_file import validated
+from nrdf.process.knowledge_file import KNOWLEDGE_FILE
 from nrdf.process.new_knowledge import DEFAULTS
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
@@ -138,7 +138,8 @@ def _process_transfer(settings: Settings, reference: str) -> ProcessTransfer:
         "regions": rows,
     }
     return ProcessTransfer(
-        BoundKnowledge(validated(content, reference), cloud, regions), retrieval.model
+        BoundKnowledge(KNOWLEDGE_FILE.validated(content, reference), cloud, regions),
+        retrieval.model,
     )
 
 

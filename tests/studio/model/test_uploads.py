@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from builders.studio_page import small_box
-from nrdf.errors import CloudError, ProcessError
+from nrdf.errors import CloudError, OutputError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.studio.model import uploads
 from nrdf.studio.model.uploads import (
     LARGEST_UPLOAD,
     read_knowledge_zip,
+    read_sent,
     read_upload,
     shown_name,
     thinned_reference,
@@ -106,3 +109,14 @@ def archive(**files):
 def test_archives_that_hold_no_knowledge_are_refused(content, said):
     with pytest.raises(ProcessError, match=said):
         read_knowledge_zip("../k.zip", content)
+
+
+def test_a_full_disk_is_said_to_be_one(monkeypatch):
+    def full(self, content):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match="No space left on device; free some space"):
+        read_knowledge_zip("k.zip", archive(**{"a.yaml": "x"}))
+    with pytest.raises(OutputError, match="No space left on device; free some space"):
+        read_sent("a.ply", b"ply")

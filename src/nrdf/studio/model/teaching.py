@@ -12,7 +12,7 @@ from nrdf.errors import ProcessError
 from nrdf.geometry.units import OTHER_UNITS, to_si
 from nrdf.process.bound_knowledge import BoundKnowledge, checksum, overlaps, resolve
 from nrdf.process.knowledge import Knowledge
-from nrdf.process.knowledge_file import validated
+from nrdf.process.knowledge_file import KNOWLEDGE_FILE
 from nrdf.process.new_knowledge import DEFAULTS
 from nrdf.process.process import Process, Trajectory
 from nrdf.studio.model.document import Document, PaintedRegion
@@ -69,13 +69,13 @@ def changed_step(step: Mapping[str, Any], shown: Mapping[str, float]) -> dict[st
 def process_of(region: PaintedRegion, number: int) -> Process:
     """One step of a region. Raises ProcessError naming region, field and value."""
     content = _content("chair", {"points_m": [(0.0, 0.0, 0.0)]}, (region,))
-    return validated(content, ORIGIN).regions[0].processes[number]
+    return KNOWLEDGE_FILE.validated(content, ORIGIN).regions[0].processes[number]
 
 
 def knowledge_of(clouds: Path, document: Document) -> Knowledge:
     """The document as process knowledge, whose file belongs into the folder of the clouds.
 
-    Raises ProcessError for a document without reference or regions, and as `validated` does.
+    Raises ProcessError for a document without reference or regions, and as `ModelFile.validated`.
     """
     if document.reference is None:
         raise ProcessError("there is no reference yet: load one in step 1")
@@ -84,7 +84,7 @@ def knowledge_of(clouds: Path, document: Document) -> Knowledge:
         raise ProcessError("no region is painted yet: paint one in step 2")
     path = clouds / document.reference.file
     reference = {"cloud": document.reference.file, "sha256": checksum(path)}
-    return validated(
+    return KNOWLEDGE_FILE.validated(
         {
             "model": document.model,
             "allow_overlap": document.allow_overlap,

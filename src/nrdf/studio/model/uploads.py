@@ -14,6 +14,7 @@ from nrdf.bundled import REFERENCE, TARGETS, bundled_chair
 from nrdf.errors import CloudError, NrdfError, ProcessError
 from nrdf.field.cloud_encoder import MINIMUM_POINTS, WORKING_POINTS
 from nrdf.geometry.sampling import downsample
+from nrdf.io.atomic import output_errors
 from nrdf.io.cloud import PointCloud, check_cloud, in_metres, read_cloud
 from nrdf.io.file_names import safe_file_name
 from nrdf.process.bound_knowledge import BoundKnowledge, known_unit, read_bound_knowledge
@@ -43,13 +44,14 @@ def read_sent(name: str, content: bytes) -> PointCloud:
 
     The name is for messages, and its ending for the format; it is not used as a path. Raises
     CloudError for a file that is too large, of another type, or that `nrdf.io.cloud.read_cloud`
-    refuses.
+    refuses, and OutputError where the disk is full.
     """
     ending = check_upload(name, len(content))
     shown = shown_name(name)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"upload{ending}"
-        path.write_bytes(content)
+        with output_errors(path):
+            path.write_bytes(content)
         try:
             cloud = read_cloud(path)
             check_cloud(cloud, MINIMUM_POINTS)
@@ -61,8 +63,9 @@ def read_sent(name: str, content: bytes) -> PointCloud:
 def read_knowledge_zip(name: str, content: bytes) -> BoundKnowledge:
     """The knowledge of a ZIP archive that a browser sent: one knowledge file, and what it names.
 
-    Raises ProcessError for what is no such archive, holds folders within folders or too much, and
-    what `nrdf.process.bound_knowledge.read_bound_knowledge` raises.
+    Raises ProcessError for what is no such archive, holds folders within folders or too much,
+    OutputError where the disk is full, and what
+    `nrdf.process.bound_knowledge.read_bound_knowledge` raises.
     """
     shown = shown_name(name)
     with tempfile.TemporaryDirectory() as folder:
@@ -96,7 +99,9 @@ def _unpack(archive: zipfile.ZipFile, folder: Path, shown: str) -> None:
         if safe_file_name(file, "") != file or (folder / file).exists():
             raise ProcessError(f"{shown}: '{shown_name(file)}' is no name that is taken, or twice")
         with archive.open(member) as sent:  # no more than its size says
-            (folder / file).write_bytes(sent.read(member.file_size))
+            whole = sent.read(member.file_size)
+        with output_errors(folder / file):
+            (folder / file).write_bytes(whole)
 
 
 def check_upload(name: str, size: int) -> str:
