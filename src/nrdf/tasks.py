@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import pickle
 import signal
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from importlib.util import find_spec
 from itertools import islice
 from typing import Any, TypeVar
@@ -76,7 +78,7 @@ def run_tasks(
 
     With one worker everything runs in this process, in order. Local workers have one thread each.
     The workers of a cluster must have one too, see the same files and have the same nrdf; they work
-    in this process's folder. `work` is sent once. A task whose worker dies is done once more; where
+    in this process's folder. A task whose worker dies is done once more; where
     that worker dies too, TaskLost is its result.
     When the loop over the results is left early (close the generator), or on Ctrl-C, local workers
     end. Raises ConfigError where the package distributed is missing, and ClusterError for a
@@ -156,16 +158,15 @@ def _mapped(
 ) -> Iterator[tuple[Task, Result | Exception]]:
     from distributed import as_completed
     from distributed.comm import CommClosedError
+    from distributed.protocol.pickle import dumps
     from distributed.scheduler import KilledWorker
 
-    # As a task of its own it is made again where all workers that have it die.
-    shared = client.submit(_itself, work, pure=False)
-    folder = os.getcwd()
+    folder, pickled = os.getcwd(), dumps(work)
     under_way: dict[str, Task] = {}
     waiting = iter(tasks)
 
     def submit(task: Task) -> Any:
-        return client.submit(_outcome_in, folder, shared, task, pure=False)
+        return client.submit(_outcome_in, folder, pickled, task, pure=False)
 
     def send(count: int) -> list[Any]:
         futures = []
@@ -199,11 +200,7 @@ def _mapped(
         yield task, came(submit(task))
 
 
-def _itself(work: Any) -> Any:
-    return work
-
-
-def _outcome_in(folder: str, work: Callable[[Task], Result], task: Task) -> Result | Exception:
+def _outcome_in(folder: str, pickled: bytes, task: Any) -> Any:
     """The outcome in a folder, from which relative paths are."""
     try:
         os.chdir(folder)
@@ -212,7 +209,13 @@ def _outcome_in(folder: str, work: Callable[[Task], Result], task: Task) -> Resu
             f"a worker cannot use the folder {folder}: {error.strerror}; workers must see the same "
             "files"
         )
-    return _outcome(work, task)
+    return _outcome(_unpickled(pickled), task)
+
+
+@lru_cache(maxsize=1)
+def _unpickled(work: bytes) -> Any:
+    """The work of all tasks, read once a worker."""
+    return pickle.loads(work)
 
 
 def _outcome(work: Callable[[Task], Result], task: Task) -> Result | Exception:

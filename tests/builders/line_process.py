@@ -60,9 +60,7 @@ def main(words: list[str]) -> None:
     if words[0] == "worker":
         from nrdf.serve import worker
 
-        worker._end_with_parent()
-        print('{"ready": true}', flush=True)  # noqa: T201
-        worker.serve(sys.stdin, sys.stdout, judge)
+        worker.serve_parent(judge)
         return
     line = line_in(Path(words[0]), Path(words[1]))
     with line.pool:

@@ -34,7 +34,8 @@ def status(headers, path="/", bodies=(b"",), token=None, wait=0.0):
         sent.append(message)
 
     raw = [(k.encode(), v.encode("latin-1")) for k, v in headers]
-    scope = {"type": "http", "path": path, "headers": raw}
+    scope = {"type": "http", "path": path, "headers": raw, "raw_path": path.encode(),
+             "query_string": b""}  # fmt: skip
     guard = Guard(echo, allowed_hosts("127.0.0.1", ["line.local"]), token, 10, 0.2)
     try:
         asyncio.run(guard(scope, receive, send))
@@ -58,6 +59,7 @@ HOST = ("host", "127.0.0.1:8088")
         ([("host", "evil.example")], 400),
         ([("host", "127.0.0.1.evil.example")], 400),
         ([("host", "[::1")], 400),
+        ([HOST, ("x", "v" * 20_000)], 431),
         ([HOST, ("origin", "http://127.0.0.1:8088")], 200),
         ([HOST, ("origin", "http://evil.example")], 403),
         ([HOST, ("origin", "http://127.0.0.1:9")], 403),

@@ -131,3 +131,23 @@ def test_events_are_told_in_order(client):
     events = client.service.events_after(0)
     assert [(e["id"], e["state"]) for e in events] == [(number, "waiting"), (number, "done")]
     assert client.service.events_after(events[0]["sequence"]) == events[1:]
+
+
+def test_a_file_that_is_sent_again_with_its_key_is_one_job(client):
+    key = {"Idempotency-Key": "chair 7"}
+    first, again = (client.post("/jobs?name=a.ply", content=b"ok", headers=key) for _ in range(2))
+    other = client.post("/jobs?name=a.ply", content=b"ok")
+    assert first.json()["id"] == again.json()["id"] != other.json()["id"]
+    assert [a.status_code for a in (first, again, other)] == [202] * 3
+
+
+def test_a_full_disk_and_too_much_that_is_kept_are_said(client, monkeypatch):
+    def full(file):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    answer = client.post("/jobs?name=a.ply", content=b"ok")
+    assert answer.status_code == 507 and "No space left" in answer.json()["detail"]
+    monkeypatch.undo()
+    client.service.kept = 10**12
+    assert client.post("/jobs?name=a.ply", content=b"ok").status_code == 429

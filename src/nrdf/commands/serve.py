@@ -33,6 +33,8 @@ def serve(
     root: tuple[Folder, ...] = (),
     allow_host: tuple[str, ...] = (),
     max_upload_mb: Count = 200,
+    keep_gb: Annotated[float, Bounds(0.0, above=True), Metavar("GB")] = 20.0,
+    keep_days: Annotated[float, Bounds(0.0, above=True), Metavar("DAYS")] = 30.0,
     workers: Count | None = None,
 ) -> None:
     """Make checked programs of objects that are sent over HTTP.
@@ -55,6 +57,8 @@ def serve(
         root: Folders whose files may be named by path, instead of being sent.
         allow_host: Further names that this machine is asked by.
         max_upload_mb: Largest file that is taken.
+        keep_gb: Files that were sent are kept up to so much; then the oldest that are done go.
+        keep_days: And for so long.
         workers: Worker processes; the cell's unless given.
     """
     from nrdf.cell.file import read_cell
@@ -71,7 +75,7 @@ def serve(
     if token is None and not is_loopback(host):
         token = secrets.token_urlsafe(24)
         errors.print(f"requests need this token: Authorization: Bearer {token}")
-    limits = (max_upload_mb * 10**6, host, port, token, allow_host, root)
+    limits = (max_upload_mb * 10**6, host, port, token, allow_host, root, keep_gb, keep_days)
     _serve(described, cell, out, inbox, workers, *limits)
 
 
@@ -87,12 +91,15 @@ def _serve(
     token: str | None,
     allow_host: tuple[str, ...],
     roots: tuple[Path, ...],
+    keep_gb: float,
+    keep_days: float,
 ) -> None:
     from nrdf.errors import ConfigError, OutputError
 
     try:
         import uvicorn
 
+        from nrdf.serve.connections import TimedProtocol
         from nrdf.serve.service import Service, create_app
     except ImportError:
         raise ConfigError(_NEEDED) from None
@@ -102,10 +109,11 @@ def _serve(
     from nrdf.serve.summary import write_summary
 
     with open_line(cell, cell_file, out, inbox, workers) as line:
-        service = Service(line, cell.name, tuple(root.resolve() for root in roots))
+        inside = tuple(root.resolve() for root in roots)
+        service = Service(line, cell.name, inside, keep_gb, keep_days)
         app = Guard(create_app(service), allowed_hosts(host, allow_host), token, most_bytes)
         config = uvicorn.Config(
-            app, host, port, log_level="warning", server_header=False, limit_concurrency=500,
+            app, host, port, log_level="error", server_header=False, http=TimedProtocol,
             timeout_keep_alive=10, timeout_graceful_shutdown=3,
         )  # fmt: skip
         stepping = threading.Thread(target=service.run, daemon=True)

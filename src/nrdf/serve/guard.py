@@ -6,7 +6,7 @@ import asyncio
 import hmac
 import json
 from collections.abc import Awaitable, Callable, MutableMapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from starlette.exceptions import HTTPException
@@ -20,6 +20,7 @@ App = Callable[[Message, Receive, Send], Awaitable[None]]
 
 _OPEN = ("/healthz",)
 """Paths that need no token: what a load balancer asks."""
+_LARGEST_HEAD = 1 << 14
 
 
 class _Refused(HTTPException):
@@ -29,13 +30,16 @@ class _Refused(HTTPException):
 @dataclass(frozen=True)
 class Guard:
     """Refuses requests before `app` sees them: 400 for a foreign Host, 403 for a foreign Origin,
-    401 without the token, 413 for a body above `most_bytes`, 408 for one that does not come."""
+    401 without the token, 431 for large headers, 413 for a body above `most_bytes`, 408 for one
+    that does not come, 429 where more than `most_requests` are under way."""
 
     app: App
     hosts: frozenset[str]
     token: str | None
     most_bytes: int
     patience_s: float = 30.0
+    most_requests: int = 500
+    _under_way: list[None] = field(default_factory=list)
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -49,14 +53,22 @@ class Guard:
             begun = begun or message["type"] == "http.response.start"
             await send(message)
 
+        self._under_way.append(None)
         try:
             self._check(scope)
             await self.app(scope, self._limited(receive), noting)
         except _Refused as refused:
             if not begun:
                 await _answer(send, refused.status_code, refused.detail)
+        finally:
+            self._under_way.pop()
 
     def _check(self, scope: Message) -> None:
+        if len(self._under_way) > self.most_requests:
+            raise _Refused(429, "too many requests at once; come back later")
+        head = sum(len(name) + len(value) for name, value in scope["headers"])
+        if head + len(scope["raw_path"]) + len(scope["query_string"]) > _LARGEST_HEAD:
+            raise _Refused(431, f"path and headers have at most {_LARGEST_HEAD} bytes together")
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1").lower(), []).append(value.decode("latin-1"))

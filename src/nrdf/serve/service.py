@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import threading
 import time
@@ -11,26 +12,29 @@ from collections import deque
 from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from fastapi import FastAPI, HTTPException, Query, Request
+from fastapi import FastAPI, Header, HTTPException, Query, Request
 from fastapi.responses import FileResponse, HTMLResponse, PlainTextResponse, StreamingResponse
 
-from nrdf.io.locks import random_token
+from nrdf.errors import DataError
 from nrdf.io.result_folder import REPORT
 from nrdf.reports.html import html_text
 from nrdf.reports.job_folder import PICTURE
 from nrdf.serve.line import Line
 from nrdf.serve.outbox import OBJECT
-from nrdf.serve.store import OUTCOMES, ObjectRow, safe_name
+from nrdf.serve.store import OUTCOMES, ObjectRow
 from nrdf.serve.summary import page_content
+from nrdf.serve.uploads import Uploads
 from nrdf.serve.watch import ArrivedFile
 from nrdf.serve.work import PROGRAMS
 
 UPLOADS = "uploads"
+State = Literal["waiting", "running", "done", "look-at", "refused"]
 MOST_WAITING = 10_000
-_STEP_S, _LOOK_S, _KEPT_EVENTS, _MOST_LISTED = 0.1, 0.3, 2000, 1000
+_STEP_S, _LOOK_S, _CLEAR_S, _KEPT_EVENTS, _MOST_LISTED = 0.1, 0.3, 60.0, 2000, 1000
 _LONGEST_NAME = 200
 
 
@@ -38,30 +42,47 @@ _LONGEST_NAME = 200
 class Service:
     """A line that a thread steps, and what HTTP asks of it.
 
-    roots: folders whose files may be named by path. failed: why the line has ended, "" while it
-    runs.
+    roots: folders whose files may be named by path. keep_gb, keep_days: how much of what was sent
+    is kept, and for how long. failed: why the line has ended, "" while it runs.
     """
 
     line: Line
     name: str
     roots: Sequence[Path] = ()
+    keep_gb: float = 20.0
+    keep_days: float = 30.0
     failed: str = ""
     _events: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=_KEPT_EVENTS))
     _sequence: int = 0
+    kept: int = 0
     _ended: threading.Event = field(default_factory=threading.Event)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def run(self) -> None:
         """Step the line until `end`; for a thread of its own."""
         self.line.on_end = lambda row: self._tell(row)
+        cleared = -math.inf
         try:
             while not self._ended.wait(_STEP_S):
                 self.line.step()
+                if time.monotonic() - cleared > _CLEAR_S:
+                    self.uploads.clear(self.line.store.open_sources())
+                    self.kept, cleared = self.uploads.bytes(), time.monotonic()
         except Exception as error:  # told to whoever asks; the store is as it was
             self.failed = f"{type(error).__name__}: {error}"
 
     def end(self) -> None:
         self._ended.set()
+
+    @cached_property
+    def uploads(self) -> Uploads:
+        folder = self.line.outbox.folder / UPLOADS
+        return Uploads(folder, int(1e9 * self.keep_gb), 86400 * self.keep_days)
+
+    def require_space(self) -> None:
+        """Raise HTTPException where more is kept than may be, since it still waits."""
+        if self.kept > self.uploads.most_bytes:
+            raise HTTPException(429, f"{self.keep_gb:g} GB of files are kept; come back later")
 
     def take(self, path: Path, label: str) -> ObjectRow:
         """Queue a file; the row of the same one where it is known. Raises HTTPException."""
@@ -130,12 +151,18 @@ class Service:
 
 def create_app(service: Service) -> FastAPI:
     """The endpoints. Put `nrdf.serve.guard.Guard` before them."""
-    app = FastAPI(title=f"nrdf: {service.name}", description=__doc__ or "")
-    uploads = service.line.outbox.folder / UPLOADS
+    app = FastAPI(title=f"nrdf: {service.name}", description=__doc__ or "", redirect_slashes=False)
 
     @app.post("/jobs", status_code=202)
-    async def add(request: Request, name: str = Query("", max_length=_LONGEST_NAME)) -> Any:
-        """Queue an object: the file as the body, with ?name=chair-1.ply, or JSON {"path": ...}."""
+    async def add(
+        request: Request,
+        name: str = Query("", max_length=_LONGEST_NAME),
+        idempotency_key: str | None = Header(None, max_length=_LONGEST_NAME),
+    ) -> Any:
+        """Queue an object: the file as the body, with ?name=chair-1.ply, or JSON {"path": ...}.
+
+        With an Idempotency-Key a file may be sent again, when no answer came: it is one job.
+        """
         if request.headers.get("content-type", "").startswith("application/json") and not name:
             try:
                 path = json.loads(await request.body())["path"]
@@ -147,25 +174,25 @@ def create_app(service: Service) -> FastAPI:
             return service.describe(await asyncio.to_thread(service.take, place, place.name))
         if not name:
             raise HTTPException(422, "give ?name=, with the ending of the file: chair-1.ply")
-        suffix = "".join(c for c in Path(name).suffix if c.isalnum() or c == ".")
-        folder = uploads / random_token()
-        place = folder / f"{safe_name(name)}{suffix[:12]}"
-        folder.mkdir(parents=True)
+        service.require_space()
+        place = service.uploads.place(name, idempotency_key)
         try:
-            with open(place, "xb") as file:
-                async for chunk in request.stream():
-                    file.write(chunk)
-            if not place.stat().st_size:
-                raise HTTPException(422, "the body is empty")
-            row = await asyncio.to_thread(service.take, place, place.name)
-        except BaseException:
-            place.unlink(missing_ok=True)
-            folder.rmdir()
-            raise
-        return service.describe(row)
+            if place.exists():
+                async for _ in request.stream():
+                    pass  # it was sent before, by a client that did not hear the answer
+            else:
+                with service.uploads.receiving(place) as file:
+                    async for chunk in request.stream():
+                        file.write(chunk)
+                service.kept += place.stat().st_size
+        except DataError as error:
+            raise HTTPException(422, str(error)) from None
+        except OSError as error:
+            raise HTTPException(507, f"cannot keep the file: {error.strerror}") from None
+        return service.describe(await asyncio.to_thread(service.take, place, place.name))
 
     @app.get("/jobs")
-    def jobs(state: str | None = None, limit: int = Query(100, ge=1, le=_MOST_LISTED)) -> Any:
+    def jobs(state: State | None = None, limit: int = Query(100, ge=1, le=_MOST_LISTED)) -> Any:
         """The latest objects, those in a state where one is given."""
         return [service.describe(row) for row in service.line.store.rows(state, limit)]
 
@@ -195,9 +222,8 @@ def create_app(service: Service) -> FastAPI:
 
     @app.get("/jobs/{number}/programs/{name:path}")
     def program(number: int, name: str) -> FileResponse:
-        file = service.file(service.row(number), PROGRAMS, name)
-        if PROGRAMS not in file.parts:
-            raise HTTPException(404, "there is no such file")
+        folder = service.file(service.row(number), OBJECT).parent / PROGRAMS
+        file = service._inside(folder, name)
         return FileResponse(file, media_type="application/octet-stream")
 
     @app.get("/objects/{outcome}/{name}/{inner:path}")

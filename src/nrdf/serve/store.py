@@ -165,6 +165,14 @@ class Store:
             return self._rows("ORDER BY id DESC LIMIT ?", most)
         return self._rows("WHERE state = ? ORDER BY id DESC LIMIT ?", state, most)
 
+    def open_sources(self) -> set[str]:
+        """The files of all objects that have no outcome yet."""
+        with self._lock, self._errors():
+            found = self._db.execute(
+                "SELECT source FROM objects WHERE state IN ('waiting', 'running')"
+            ).fetchall()
+        return {source for (source,) in found}
+
     def counts(self) -> dict[str, int]:
         """How many objects are in each state."""
         with self._lock, self._errors():

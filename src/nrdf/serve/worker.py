@@ -28,10 +28,7 @@ READY = {"ready": True}
 
 def main(arguments: list[str]) -> int:
     """Serve objects until there are no more."""
-    # Libraries that print would break the protocol: what they say goes to standard error.
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-    _end_with_parent()
+    answers = _answers()
     from nrdf.serve.work import ObjectWork
 
     logging.getLogger("nrdf").addHandler(logging.NullHandler())
@@ -40,20 +37,36 @@ def main(arguments: list[str]) -> int:
     except NrdfError as error:
         _say(answers, {"failed": str(error)})
         return 2
-    _say(answers, READY)
-    with suppress(BrokenPipeError):  # the line has gone; so does this
-        serve(sys.stdin, answers, lambda row, place: asdict(work.judge(row, place)))
+    serve(sys.stdin, answers, lambda row, place: asdict(work.judge(row, place)))
     return 0
+
+
+def serve_parent(judge: Callable[[ObjectRow, Path], Mapping[str, Any]]) -> None:
+    """Answer the tasks of the process that started this one by a judge of another kind."""
+    serve(sys.stdin, _answers(), judge)
 
 
 def serve(
     tasks: TextIO, answers: TextIO, judge: Callable[[ObjectRow, Path], Mapping[str, Any]]
 ) -> None:
-    """Answer every task, a line each, until they end."""
-    for line in tasks:
-        task = json.loads(line)
-        said = judge(ObjectRow(**task["row"]), Path(task["work"]))
-        _say(answers, {"id": task["row"]["id"], **said})
+    """Be ready, and answer every task, a line each, until they end."""
+    with suppress(BrokenPipeError):  # the line has gone; so does this
+        _say(answers, READY)
+        for line in tasks:
+            task = json.loads(line)
+            said = judge(ObjectRow(**task["row"]), Path(task["work"]))
+            _say(answers, {"id": task["row"]["id"], **said})
+
+
+def _answers() -> TextIO:
+    """Where answers go, of a process that ends with its parent.
+
+    Libraries that print would break the protocol: what they say goes to standard error.
+    """
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    _end_with_parent()
+    return answers
 
 
 def _say(answers: TextIO, content: Mapping[str, Any]) -> None:

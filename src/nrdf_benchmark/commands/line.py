@@ -1,4 +1,4 @@
-"""`nrdf eval line`: how many objects a minute a line takes, its memory, and `kill -9`."""
+"""`nrdf eval line`: a line under load, killed, attacked, and how large a cluster may grow."""
 
 from __future__ import annotations
 
@@ -7,46 +7,69 @@ from typing import Any
 
 from nrdf.commands.console import console, errors, show, table, versions
 from nrdf.commands.options import File, Folder
+from nrdf.errors import ConfigError, OutputError
 from nrdf.io.bounds import Count, NonNegativeCount, Seed
 
 
 def line(
-    data: Folder,
-    cell: File,
     out: Folder,
+    data: Folder | None = None,
+    cell: File | None = None,
     category: tuple[str, ...] = ("chair",),
-    count: Count = 20,
+    count: NonNegativeCount = 20,
     workers: tuple[Count, ...] = (1, 2),
     kills: NonNegativeCount = 0,
+    requests: NonNegativeCount = 0,
     seed: Seed = 0,
 ) -> None:
-    """Measure a line: objects a minute, memory, and what is lost where it is killed.
+    """Measure a line: objects a minute, memory, what is lost where it is killed, a hostile client.
 
-    Objects are labelled meshes, stretched at random. Each number of workers takes all of them;
-    then, with --kills, `nrdf run` is killed at random moments and goes on.
+    Objects are labelled meshes with the knowledge of --cell, or, without --data, small clouds of
+    the package's chairs with one process, which cost 1 s each. Each number of workers takes all of
+    them. With --kills, `nrdf run` and then `nrdf serve` are killed so often at random moments, and
+    go on; with --requests a hostile client sends so many to `nrdf serve`. In both, workers only
+    write: that is where something may break.
 
-    Example: nrdf eval line --data objects/ikea --cell cell.yaml --out results/ --count 200
+    Example: nrdf eval line --out results/ --count 200 --kills 100 --requests 20000
 
     Args:
+        out: New folder for inbox, outboxes and line.json.
         data: Folder of labelled meshes (docs/evidence/bsrc.md).
         cell: Cell file with the knowledge of these objects.
-        out: New folder for inbox, outboxes and line.json.
         category: Kinds of object to take.
         count: Objects.
         workers: Numbers of worker processes to compare.
-        kills: How often `nrdf run` is killed, at most.
-        seed: Of the stretching and of the moments.
+        kills: How often `nrdf run`, and `nrdf serve`, are killed.
+        requests: Requests of the hostile client.
+        seed: Of the stretching, the moments and the requests.
     """
-    from nrdf.errors import OutputError
     from nrdf.io.atomic import write_json
-    from nrdf_benchmark.line.kills import kill_runs
-    from nrdf_benchmark.line.objects import write_meshes
-    from nrdf_benchmark.line.speed import measure_line
+    from nrdf_benchmark.line.objects import write_light_cell, write_light_objects, write_meshes
 
     if out.exists():
         raise OutputError(f"{out} is there already; give a new folder")
+    if (data is None) != (cell is None):
+        raise ConfigError("give --data and --cell together, or neither")
     inbox = out / "inbox"
-    write_meshes(inbox, data, list(category), count, seed)
+    if data is not None and cell is not None:
+        write_meshes(inbox, data, category, count, seed)
+    else:
+        write_light_objects(inbox, count, seed)
+        cell = write_light_cell(out)
+    content: dict[str, Any] = {"versions": versions()}
+    if count:
+        content["speed"] = _speed(cell, inbox, out, workers)
+    if kills:
+        content["kills"] = _kills(cell, out, kills, seed)
+    if requests:
+        content["attack"] = _attack(cell, out, requests, seed)
+    write_json(out / "line.json", content)
+    console.print(f"wrote {Path(out) / 'line.json'}")
+
+
+def _speed(cell: Path, inbox: Path, out: Path, workers: tuple[int, ...]) -> list[dict[str, Any]]:
+    from nrdf_benchmark.line.speed import measure_line
+
     shown = table(
         "", "workers", "objects", "a minute", "a core minute", "memory, MB", "growth, %",
         "done", "look-at", "refused",
@@ -55,7 +78,7 @@ def line(
     for number in workers:
         with errors.status(f"{number} workers"):
             speed = measure_line(cell, inbox, out / f"outbox-{number}", number)
-        found.append(speed)
+        found.append(vars(speed))
         outcomes = [str(speed.outcomes.get(n, 0)) for n in ("done", "look-at", "refused")]
         shown.add_row(
             str(number), str(len(speed.cpu_s)), f"{speed.per_minute:.1f}",
@@ -63,11 +86,35 @@ def line(
             f"{100 * speed.memory_growth:.1f}", *outcomes,
         )  # fmt: skip
     show(shown)
-    content: dict[str, Any] = {"versions": versions(), "speed": [vars(speed) for speed in found]}
-    if kills:
-        with errors.status("killing"):
-            lost = kill_runs(cell, inbox, out / "outbox-killed", kills, seed)
-        content["kills"] = lost
-        console.print(", ".join(f"{name} {n}" for name, n in lost.items()))
-    write_json(out / "line.json", content)
-    console.print(f"wrote {Path(out) / 'line.json'}")
+    return found
+
+
+def _kills(cell: Path, out: Path, kills: int, seed: int) -> dict[str, dict[str, int]]:
+    from nrdf_benchmark.line.kills import kill_runs, kill_services
+
+    found = {}
+    for name, kill in (("run", kill_runs), ("serve", kill_services)):
+        with errors.status(f"killing nrdf {name}"):
+            found[name] = kill(cell, out / f"killed-{name}", kills, seed)
+        console.print(
+            f"nrdf {name}: " + ", ".join(f"{what} {n}" for what, n in found[name].items())
+        )
+    return found
+
+
+def _attack(cell: Path, out: Path, requests: int, seed: int) -> dict[str, Any]:
+    from nrdf_benchmark.line.hostile import attack_service
+
+    with errors.status("a hostile client"):
+        found, after = attack_service(cell, out / "attacked", requests, seed)
+    shown = table("", "attack", "requests", "answers")
+    for kind, counts in sorted(found.answers.items()):
+        answers = ", ".join(f"{status}: {n}" for status, n in sorted(counts.items()))
+        shown.add_row(kind, str(sum(counts.values())), answers)
+    show(shown)
+    for one in found.wrong[:10]:
+        console.print(one)
+    console.print(
+        f"{found.requests} requests, {len(found.wrong)} not answered with 4xx; after that: {after}"
+    )
+    return {"answers": found.answers, "wrong": found.wrong, "after": after}

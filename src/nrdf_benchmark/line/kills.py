@@ -1,45 +1,119 @@
-"""What `kill -9` costs a line."""
+"""What `kill -9` costs `nrdf run` and `nrdf serve` at random moments under load."""
 
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
+import threading
+import time
+import urllib.error
+import urllib.request
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from nrdf.serve.outbox import OBJECT
+from nrdf.serve.store import OUTCOMES
+
+LIGHT = ("-m", "nrdf_benchmark.line.light_worker")
+_OBJECTS_A_KILL = 4
+_SHORTEST_S, _LONGEST_S = 0.2, 2.0
+"""From the first sign of work of a process to its end."""
+_START_S, _END_S, _ASK_S = 120.0, 300.0, 5.0
 
 
-def kill_runs(cell_file: Path, inbox: Path, out: Path, kills: int, seed: int) -> dict[str, int]:
-    """Kill `nrdf run` at random moments, at most `kills` times, then let it end; what was found.
-
-    lost: objects without an outcome; twice: with more than one folder; halves: folders without
-    their object.json, or unlike the store.
-    """
-    code = "import sys; from nrdf import cli; sys.exit(cli.run(sys.argv[1:]))"
-    words = ["run", str(cell_file), str(inbox), "--out", str(out), "--once"]
+def kill_runs(cell: Path, folder: Path, kills: int, seed: int) -> dict[str, int]:
+    """Kill `nrdf run` with light workers so often while it works, then let it end."""
+    inbox, out = folder / "inbox", folder / "outbox"
+    inbox.mkdir(parents=True)
+    for number in range(_OBJECTS_A_KILL * kills):
+        (inbox / f"{number:05}.csv").write_text(f"{number}\n")
+    words = [*LIGHT, "run", str(cell), str(inbox), "--out", str(out), "--workers", "2", "--once"]
     rng, done = np.random.default_rng(seed), 0
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     for _ in range(kills):
-        process = subprocess.Popen([sys.executable, "-c", code, *words], **quiet)  # type: ignore[call-overload]
-        try:
-            process.wait(float(rng.uniform(2.0, 20.0)))
-            break
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        before = published(out)
+        process = _start(words)
+        wait_until(partial(_worked, process, out, before))
+        time.sleep(rng.uniform(0.0, _LONGEST_S))
+        done += process.poll() is None
+        process.kill()
+        process.wait()
+    _start(words).wait()
+    return {"kills": done, **check_outbox([path.name for path in inbox.iterdir()], out)}
+
+
+def kill_services(cell: Path, folder: Path, kills: int, seed: int) -> dict[str, int]:
+    """Kill `nrdf serve` with light workers so often while files are sent; then let it end.
+
+    A file without an answer is sent again, with the same Idempotency-Key.
+    """
+    out, rng, sent, done = folder / "outbox", np.random.default_rng(seed), 0, 0
+    folder.mkdir(parents=True)
+    port = free_port()
+    for _ in range(kills):
+        with serving(cell, out, port) as url:
+            killer = threading.Timer(rng.uniform(_SHORTEST_S, _LONGEST_S), url.process.kill)
+            killer.start()
+            while url.process.poll() is None:
+                sent += _send(url, sent)
             done += 1
-    subprocess.run([sys.executable, "-c", code, *words], check=False, **quiet)  # type: ignore[call-overload]
-    return {"kills": done, **check_outbox(inbox, out)}
+    with serving(cell, out, port):
+        wait_until(lambda: published(out) >= sent, _END_S)
+    return {"kills": done, **check_outbox([f"{number:05}.csv" for number in range(sent)], out)}
 
 
-def check_outbox(inbox: Path, out: Path) -> dict[str, int]:
-    """How many objects of an inbox are lost, done twice, or half written in an outbox."""
-    folders = [p for outcome in ("done", "look-at", "refused") for p in (out / outcome).iterdir()]
-    sources, halves = Counter(), 0  # type: ignore[var-annotated]
+def _worked(process: subprocess.Popen[bytes], out: Path, before: int) -> bool:
+    return published(out) > before or process.poll() is not None
+
+
+class Url(str):
+    """A server's address, with its process."""
+
+    process: subprocess.Popen[bytes]
+
+
+@contextmanager
+def serving(cell: Path, out: Path, port: int, *more: str) -> Iterator[Url]:
+    """`nrdf serve` with two light workers, which answers; ended with the block."""
+    words = [*LIGHT, "serve", str(cell), "--out", str(out), "--workers", "2", "--port", str(port)]
+    url = Url(f"http://127.0.0.1:{port}")
+    url.process = _start([*words, *more])
+    try:
+        wait_until(lambda: _answers(f"{url}/healthz"))
+        yield url
+    finally:
+        url.process.terminate()
+        url.process.wait()
+
+
+def free_port() -> int:
+    """A port of this machine that nothing listens on."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def published(out: Path) -> int:
+    """How many folders there are in an outbox."""
+    places = (out / outcome for outcome in OUTCOMES)
+    return sum(1 for place in places if place.is_dir() for _ in place.iterdir())
+
+
+def check_outbox(names: Sequence[str], out: Path) -> dict[str, int]:
+    """How many of the named files are lost, done twice, or half written in an outbox.
+
+    lost: without an outcome; twice: with more than one folder; halves: folders without their
+    object.json, or of another outcome than it says, and parts of files.
+    """
+    folders = [p for outcome in OUTCOMES for p in (out / outcome).iterdir()]
+    sources: Counter[str] = Counter()
+    halves = sum(1 for outcome in OUTCOMES for _ in (out / outcome).rglob("*.part"))
     for folder in folders:
         try:
             said = json.loads((folder / OBJECT).read_text("utf-8"))
@@ -48,10 +122,41 @@ def check_outbox(inbox: Path, out: Path) -> dict[str, int]:
             continue
         halves += said["outcome"] != folder.parent.name
         sources[Path(said["source"]).name] += 1
-    names = [path.name for path in inbox.iterdir()]
     return {
         "objects": len(names),
         "lost": sum(name not in sources for name in names),
         "twice": sum(count - 1 for count in sources.values()),
         "halves": halves,
     }
+
+
+def _start(words: Sequence[str]) -> subprocess.Popen[bytes]:
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen([sys.executable, *words], stdout=quiet, stderr=quiet)
+
+
+def wait_until(until: Callable[[], bool], seconds: float = _START_S) -> None:
+    end = time.monotonic() + seconds
+    while not until() and time.monotonic() < end:
+        time.sleep(0.02)
+
+
+def _answers(url: str) -> bool:
+    try:
+        with urllib.request.urlopen(url, timeout=_ASK_S) as answer:
+            return bool(answer.status == 200)
+    except OSError:
+        return False
+
+
+def _send(url: str, number: int) -> bool:
+    """Send an object; whether the service said that it has it."""
+    request = urllib.request.Request(
+        f"{url}/jobs?name={number:05}.csv", f"{number}\n".encode(),
+        {"Idempotency-Key": f"object {number}", "Content-Type": "text/csv"},
+    )  # fmt: skip
+    try:
+        with urllib.request.urlopen(request, timeout=_ASK_S) as answer:
+            return bool(answer.status == 202)
+    except (OSError, ValueError):
+        return False

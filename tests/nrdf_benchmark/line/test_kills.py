@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 
-from nrdf_benchmark.line.kills import check_outbox
+from nrdf_benchmark.line.kills import check_outbox, kill_runs, published
+from nrdf_benchmark.line.objects import write_light_cell
 
 
 def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
-    inbox, out = tmp_path / "inbox", tmp_path / "out"
-    inbox.mkdir()
-    for name in ("a", "b", "c"):
-        (inbox / name).write_text("x")
+    out = tmp_path / "out"
     for outcome, folder, said in (
         ("done", "a", {"source": "/in/a", "outcome": "done"}),
         ("done", "a-2", {"source": "/in/a", "outcome": "done"}),
@@ -21,4 +19,10 @@ def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
         (out / outcome / folder).mkdir(parents=True)
         if said:
             (out / outcome / folder / "object.json").write_text(json.dumps(said))
-    assert check_outbox(inbox, out) == {"objects": 3, "lost": 1, "twice": 1, "halves": 2}
+    assert check_outbox(["a", "b", "c"], out) == {"objects": 3, "lost": 1, "twice": 1, "halves": 2}
+    assert published(out) == 4
+
+
+def test_a_run_that_is_killed_loses_nothing(tmp_path):
+    found = kill_runs(write_light_cell(tmp_path), tmp_path / "kills", 1, 0)
+    assert found == {"kills": 1, "objects": 4, "lost": 0, "twice": 0, "halves": 0}
