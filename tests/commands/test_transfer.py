@@ -12,7 +12,7 @@ import trimesh
 
 from builders.taught_box import SIZE, cloud, faces
 from nrdf import cli
-from nrdf.commands.transfer import job_folders
+from nrdf.commands.transfer import job_folders, listed_targets
 from nrdf.errors import CloudError, ConfigError, LimitError, NothingFoundError
 from nrdf.io.cloud import PointCloud, write_cloud
 from nrdf.serve.many import TransferOutcome
@@ -369,6 +369,13 @@ def test_folders_of_targets():
         job_folders([a, Path("z/A.stl")], None)
     with pytest.raises(ConfigError, match="needs a TARGET"):
         job_folders([], None)
+
+
+def test_targets_from_a_list(tmp_path):
+    (tmp_path / "list").write_text("\ufeffa.ply\n\n  b c.ply \r\n")
+    assert listed_targets(tmp_path / "list") == [Path("a.ply"), Path("b c.ply")]
+    with pytest.raises(ConfigError, match="none"):
+        listed_targets(tmp_path / "none")
 
 
 def test_marked_regions_are_of_one_target(four, capsys):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 
+import pytest
+
 from nrdf.serve.store import ObjectRow
-from nrdf.serve.summary import csv_text, doubtful_first, write_summary
+from nrdf.serve.summary import csv_text, doubtful_first, page_content, write_summary
 
 
 def row(id, state, name="a", reason="", **figures):
@@ -39,3 +41,19 @@ def test_the_page_shows_pictures_and_escapes_names(tmp_path):
     assert 'src="done/sure/picture.png"' in page and 'href="refused/bad/reason.txt"' in page
     assert "1 min 1 s" in page and page.index("odd, look-at") < page.index("unsure, done")
     assert (tmp_path / "objects.csv").read_text().count("\n") == 5
+
+
+def test_a_page_shows_so_many_and_says_how_many_there_are(monkeypatch):
+    monkeypatch.setattr("nrdf.serve.summary.MOST_SHOWN", 2)
+    content = page_content(ROWS, "x")
+    assert content["total"] == 4 and len(content["rows"]) == 2
+    assert content["counts"]["look-at"] == 1 and content["counts"]["waiting"] == 0
+    assert page_content(ROWS, "x", counts={"done": 9})["total"] == 9
+
+
+def test_the_table_is_parquet_as_well(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write_summary(tmp_path, ROWS, "x")
+    rows = parquet.read_table(tmp_path / "objects.parquet").to_pylist()
+    assert [row["confidence"] for row in rows] == [0.9, 0.5, 0.8, None]
+    assert rows[2]["reason"] == "=HYPERLINK()" and rows[0]["id"] == 1

@@ -85,14 +85,18 @@ def _drive(line: Line, cell: WorkCell, out: Path, once: bool) -> None:
         ended = True
 
     before = signal.signal(signal.SIGTERM, end)
-    written, last, passes = -1, 0.0, 0
+    written, next_summary, passes = -1, 0.0, 0
     try:
         while not ended:
             line.step()
             passes += 1
-            if line.changed != written and time.monotonic() - last > _SUMMARY_S:
-                written, last = line.changed, time.monotonic()
+            began = time.monotonic()
+            if line.changed != written and began > next_summary:
+                written = line.changed
                 write_summary(out, line.store.rows(), cell.name, refresh_s=10)
+                # After weeks there are many rows; they take a twentieth of the time at most.
+                took = time.monotonic() - began
+                next_summary = time.monotonic() + max(_SUMMARY_S, 19 * took)
             # The first pass only sees what is there.
             if once and passes > 1 and line.idle:
                 break

@@ -19,6 +19,7 @@ from nrdf.tasks import Workers, chosen_workers, run_tasks
 if TYPE_CHECKING:
     from nrdf.serve.many import TransferOutcome, TransferTask
 
+_LARGEST_LIST = 1 << 30
 _SEVERITY = (0, 3, 4, 2)  # exit codes, from good to bad: with 2 there is no result
 
 Degrees = Annotated[float, Bounds(0.0, 180.0), Metavar("DEG")]
@@ -27,7 +28,8 @@ ShareOption = Annotated[Fraction, Metavar("SHARE")]
 
 def transfer(
     knowledge: Positional[Annotated[Path, Metavar("KNOWLEDGE")]],
-    target: Positional[Annotated[tuple[Path, ...], Metavar("TARGET [TARGET ...]")]],
+    target: Positional[Annotated[tuple[Path, ...], Metavar("TARGET [TARGET ...]")]] = (),
+    targets_from: File | None = None,
     out: Folder | None = None,
     model: str | None = None,
     unit: Unit | None = None,
@@ -72,6 +74,7 @@ def transfer(
         knowledge: Knowledge file, as `nrdf teach` begins it.
         target: Cloud or mesh of a new object: +X forward, +Y up, or in any pose with --up. One or
             more.
+        targets_from: File with more targets, a path a line: more than a command line holds.
         out: Folder to write, job-NAME unless given, by the target's name; with several targets the
             folder of their folders.
         model: Zoo name, weight file or run, such as general or registration, which serve any
@@ -124,8 +127,10 @@ def transfer(
     )
     scan = ScanOptions(up, sensor, unit, skip, topic)
     scan.refuse_without_up("sensor", "skip")
-    if region and len(target) > 1:
+    if region and (len(target) > 1 or targets_from is not None):
         raise ConfigError("--region marks regions of one target; give one target")
+    if targets_from is not None:
+        target = (*target, *listed_targets(targets_from))
     folders = job_folders(target, out)
     if len(target) == 1 and cluster is None:
         objects = ObjectTransfer(knowledge, model, device, scan, min_confidence)
@@ -162,6 +167,14 @@ def _transfer_many(
             for reason in came.reasons or ("made before" if came.known else "good",):
                 errors.print(f"{came.target}: {reason}", style=style)
     return [found[pair] for pair in pairs]
+
+
+def listed_targets(file: Path) -> list[Path]:
+    """The paths in a file, one a line. Raises ConfigError for one that cannot be read."""
+    from nrdf.io.files import read_file
+
+    text = read_file(file, ConfigError, _LARGEST_LIST).decode("utf-8-sig", "surrogateescape")
+    return [Path(line.strip()) for line in text.splitlines() if line.strip()]
 
 
 def job_folders(targets: Sequence[Path], out: Path | None) -> list[Path]:

@@ -275,7 +275,8 @@ def create_app(service: Service) -> FastAPI:
     @app.get("/", response_class=HTMLResponse)
     def page() -> str:
         """The status page."""
-        rows = service.line.store.rows(most=_MOST_LISTED)
-        return html_text("line.html", page_content(rows, service.name, 10, "objects/"))
+        store = service.line.store
+        rows, counts = store.rows(most=_MOST_LISTED), store.counts()
+        return html_text("line.html", page_content(rows, service.name, 10, "objects/", counts))
 
     return app

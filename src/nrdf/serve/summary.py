@@ -1,4 +1,4 @@
-"""The table of a line's objects: a page with thumbnails, and CSV; the most doubtful first."""
+"""The table of a line's objects: a page with thumbnails, CSV, Parquet; the most doubtful first."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import csv
 import io
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,21 @@ from nrdf.reports.html import duration_in_words, write_html
 from nrdf.reports.job_folder import HTML_REPORT, PICTURE
 from nrdf.serve.many import TransferOutcome
 from nrdf.serve.outbox import REASON, in_one_line
-from nrdf.serve.store import OUTCOMES, ObjectRow
+from nrdf.serve.store import STATES, ObjectRow
 
-PAGE, TABLE = "index.html", "objects.csv"
+PAGE, TABLE, PARQUET = "index.html", "objects.csv", "objects.parquet"
+MOST_SHOWN = 2000
+"""Rows of a page, which a browser must lay out; the tables have all."""
 MOST_DOUBTFUL = 10
 COLUMNS = (
     *("id", "name", "source", "state", "reason", "category", "confidence", "coverage", "paths"),
     *("skipped", "cycle_time_s", "warnings", "reached", "cpu_s", "attempts", "arrived", "seconds"),
 )
-_FIGURES = COLUMNS[5:14]
+_KINDS: dict[str, type] = {
+    **dict.fromkeys(("name", "source", "state", "reason", "category", "arrived"), str),
+    **dict.fromkeys(("id", "paths", "skipped", "warnings", "attempts"), int),
+}
+"""Of columns in Parquet; all others are numbers."""
 
 
 def doubtful_first(rows: Sequence[ObjectRow]) -> list[ObjectRow]:
@@ -69,8 +76,23 @@ def write_summary(out: Path, rows: Sequence[ObjectRow], name: str, refresh_s: in
 
     name: the cell's. refresh_s: after how long a browser loads the page again; 0: never.
     """
-    write_atomically(out / TABLE, [csv_text(rows).encode()])
+    write_tables(out, rows)
     write_html(out / PAGE, "line.html", page_content(rows, name, refresh_s))
+
+
+def write_tables(out: Path, rows: Sequence[ObjectRow]) -> None:
+    """Write the table as CSV and, where pyarrow is installed, as Parquet. Raises OutputError."""
+    write_atomically(out / TABLE, [csv_text(rows).encode()])
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        return
+    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
+    schema = pyarrow.schema([(name, kinds[_KINDS.get(name, float)]) for name in COLUMNS])
+    content = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist(list(table_rows(rows)), schema), content)
+    write_atomically(out / PARQUET, [content.getbuffer()])
 
 
 def write_catalogue(out: Path, outcomes: Sequence[TransferOutcome], name: str) -> None:
@@ -86,7 +108,7 @@ def write_catalogue(out: Path, outcomes: Sequence[TransferOutcome], name: str) -
         reason = in_one_line(list(one.reasons))
         rows.append(ObjectRow(number, one.folder.name, source, 0, 0, label, state, reason, 1,
                               time.time(), None, time.time(), figures))  # fmt: skip
-    write_atomically(out / TABLE, [csv_text(rows).encode()])
+    write_tables(out, rows)
     content = page_content(rows, name)
     for shown in [*content["rows"], *content["doubtful"]]:
         for key in ("report", "picture"):
@@ -113,18 +135,28 @@ def figures_of(report: dict[str, Any]) -> dict[str, Any]:
 
 
 def page_content(
-    rows: Sequence[ObjectRow], name: str, refresh_s: int = 0, at: str = ""
+    rows: Sequence[ObjectRow],
+    name: str,
+    refresh_s: int = 0,
+    at: str = "",
+    counts: Mapping[str, int] | None = None,
 ) -> dict[str, Any]:
-    """What the page's template is filled with. at: where the objects' folders are, as a link."""
+    """What the page's template is filled with.
+
+    at: where the objects' folders are, as a link. counts: of all objects by state, where `rows` are
+    not all.
+    """
     doubtful = doubtful_first(rows)[:MOST_DOUBTFUL]
-    counts = {state: sum(row.state == state for row in rows) for state in ("waiting", "running")}
-    counts |= {state: sum(row.state == state for row in rows) for state in OUTCOMES}
+    if counts is None:
+        found = Counter(row.state for row in rows)
+        counts = {state: found[state] for state in STATES}
     return {
+        "total": sum(counts.values()),
         "name": name,
         "refresh_s": refresh_s,
         "counts": counts,
         "doubtful": [_shown(row, at) for row in doubtful],
-        "rows": [_shown(row, at) for row in rows],
+        "rows": [_shown(row, at) for row in rows[:MOST_SHOWN]],
     }
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from nrdf.commands.console import console, errors, show, table, versions
-from nrdf.commands.options import File, Folder
+from nrdf.commands.options import File, Folder, Metavar
 from nrdf.errors import ConfigError, OutputError
 from nrdf.io.bounds import Count, NonNegativeCount, Seed
 
@@ -20,6 +20,7 @@ def line(
     workers: tuple[Count, ...] = (1, 2),
     kills: NonNegativeCount = 0,
     requests: NonNegativeCount = 0,
+    scale_out: Annotated[tuple[Count, Count], Metavar("OBJECTS WORKERS")] | None = None,
     seed: Seed = 0,
 ) -> None:
     """Measure a line: objects a minute, memory, what is lost where it is killed, a hostile client.
@@ -41,6 +42,7 @@ def line(
         workers: Numbers of worker processes to compare.
         kills: How often `nrdf run`, and `nrdf serve`, are killed.
         requests: Requests of the hostile client.
+        scale_out: How many objects, on how many workers.
         seed: Of the stretching, the moments and the requests.
     """
     from nrdf.io.atomic import write_json
@@ -50,6 +52,8 @@ def line(
         raise OutputError(f"{out} is there already; give a new folder")
     if (data is None) != (cell is None):
         raise ConfigError("give --data and --cell together, or neither")
+    if scale_out and not count:
+        raise ConfigError("--scale-out needs the times of some objects: give --count 10 or more")
     inbox = out / "inbox"
     if data is not None and cell is not None:
         write_meshes(inbox, data, category, count, seed)
@@ -63,6 +67,8 @@ def line(
         content["kills"] = _kills(cell, out, kills, seed)
     if requests:
         content["attack"] = _attack(cell, out, requests, seed)
+    if scale_out:
+        content["scale_out"] = _scale_out(out, content["speed"][0], *scale_out)
     write_json(out / "line.json", content)
     console.print(f"wrote {Path(out) / 'line.json'}")
 
@@ -118,3 +124,30 @@ def _attack(cell: Path, out: Path, requests: int, seed: int) -> dict[str, Any]:
         f"{found.requests} requests, {len(found.wrong)} not answered with 4xx; after that: {after}"
     )
     return {"answers": found.answers, "wrong": found.wrong, "after": after}
+
+
+def _scale_out(out: Path, speed: dict[str, Any], objects: int, workers: int) -> dict[str, Any]:
+    from nrdf_benchmark.line.scale_out import limits, measure_overhead, simulate
+
+    with errors.status("Dask's own time"):
+        overhead = measure_overhead()
+    seconds = speed["cpu_s"]
+    mean = sum(seconds) / len(seconds)
+    found = simulate(seconds, overhead.serial_s, objects, workers)
+    console.print(
+        f"Dask adds {1e3 * overhead.whole_s:.1f} ms to a task of {mean:.2f} s: "
+        f"{overhead.whole_s / mean:.2%}; {1e3 * overhead.serial_s:.1f} ms of it in the scheduler's "
+        f"process, which feeds {mean / overhead.serial_s:.0f} workers"
+    )
+    console.print(
+        f"{objects:,} objects on {workers} workers: {found.hours:.1f} h; the scheduler is busy "
+        f"{found.scheduler_busy:.1%} of it, workers {found.worker_busy:.1%}; {found.deaths} deaths"
+    )
+    shown = table("", "what", f"at {objects:,} objects", "then")
+    folder = out / f"outbox-{speed['workers']}"
+    jobs = [path for path in (folder / "done").iterdir()] or [folder]
+    needs = limits(jobs, objects)
+    for row in needs:
+        shown.add_row(*row)
+    show(shown)
+    return {"overhead": vars(overhead), "simulated": vars(found), "limits": needs}
