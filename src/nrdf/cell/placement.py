@@ -85,11 +85,16 @@ def place_job(cell: WorkCell, job: Job, folder: Path) -> Job:
     Raises ProcessError where it cannot be placed, LimitError for limits that it does not meet.
     """
     placed = job_in_base(cell, job, object_pose(cell, job, object_points(folder)))
-    if broken := broken_limits(cell.robot, cell.keep_out, placed):
+    require_limits(cell.robot, cell.keep_out, placed)
+    return placed
+
+
+def require_limits(robot: CellRobot, boxes: Sequence[KeepOutBox], placed: Job) -> None:
+    """Raise LimitError for a job in the base's frame that does not meet a cell's limits."""
+    if broken := broken_limits(robot, boxes, placed):
         raise LimitError(
             "\n  ".join(["not within the cell's limits; nothing is written:", *broken])
         )
-    return placed
 
 
 def broken_limits(robot: CellRobot, boxes: Sequence[KeepOutBox], placed: Job) -> list[str]:

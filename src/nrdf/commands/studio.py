@@ -22,6 +22,7 @@ def studio(
     device: str = "cpu",
     robot: File | None = None,
     tool_frame: Annotated[str, Metavar("NAME")] | None = None,
+    cell: File | None = None,
 ) -> None:
     """Paint regions and describe processes in a browser.
 
@@ -41,8 +42,9 @@ def studio(
         device: cpu, cuda, cuda:N or auto.
         robot: URDF or MJCF of the arm for simulations; the bundled arm unless given.
         tool_frame: Body or site of the robot that the tool is mounted on.
+        cell: Cell file: simulations and programs are for it, in its robot's base frame.
     """
-    from nrdf.errors import ModelError, OutputError
+    from nrdf.errors import ConfigError, ModelError, OutputError
 
     try:
         import viser  # noqa: F401
@@ -56,8 +58,14 @@ def studio(
     from nrdf.studio.app import Studio
     from nrdf.studio.model.computing import ChildProcessComputing
     from nrdf.studio.model.session import Session
+    from nrdf.studio.model.studio_cell import StudioCell
     from nrdf.studio.serving import open_server
 
+    if cell is not None and not robot is tool_frame is None:
+        raise ConfigError(
+            "the cell file says robot and tool frame: leave --robot, --tool-frame out"
+        )
+    chosen = StudioCell(robot, tool_frame) if cell is None else StudioCell.of(cell)
     categories = [entry.category for entry in list_models() if entry.category]
     if not categories:
         raise ModelError("there is no trained model in this installation: install nrdf again")
@@ -68,7 +76,7 @@ def studio(
     origin = {"command": command_line(), "versions": versions()}
     app = Studio(
         kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
-        origin, robot, tool_frame,
+        origin, chosen,
     )  # fmt: skip
     if not is_loopback(host):
         errors.print(

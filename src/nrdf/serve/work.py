@@ -119,18 +119,11 @@ class ObjectWork:
 
     def _simulated(self, work: Path, name: str, figures: dict[str, Any]) -> list[str]:
         """Simulate a job, and say what speaks against it."""
-        from nrdf.robot.model.arm import load_arm
         from nrdf.robot.report.folder import write_simulation
-        from nrdf.robot.simulation.described_cell import place_in_cell
+        from nrdf.robot.simulation.described_cell import simulate_in_cell
         from nrdf.robot.simulation.job import read_simulation_job
-        from nrdf.robot.simulation.simulate import object_distance_field, simulate
 
-        model = self.cell.robot.model
-        arm = load_arm(self.folder / model if model else None, self.cell.robot.tool_frame)
-        job = read_simulation_job(work)
-        shape = object_distance_field(job)
-        job, placement = place_in_cell(self.cell, job, shape)
-        result = simulate(job, arm, shape, placement, 1)
+        result = simulate_in_cell(self.cell, self.folder, read_simulation_job(work))
         folder = work / SIMULATION
         folder.mkdir()
         total = write_simulation(folder, result, name, {}, False, False)["total"]

@@ -13,24 +13,21 @@ from nrdf.studio.context import StudioContext
 from nrdf.studio.model.computing import ChildProcessComputing, LocalComputing
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session import Session
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.worker import Worker
 from nrdf.studio.mouse import Mouse
 from nrdf.studio.panels.inputs import ProgressBar
 from nrdf.studio.panels.panel import Panel
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    pass
 
 _ASPECT = 1.2  # width over height of a page that is not open yet
 _PATCH = 0.08  # first radius of a patch, in longest sides of the object
 
 
 class Studio(StudioContext):
-    """A session in every browser that is connected.
-
-    robot, tool_frame: the arm of simulations, the bundled one unless given. The rest as of
-    `StudioContext`.
-    """
+    """A session in every browser that is connected; arguments as of `StudioContext`."""
 
     def __init__(
         self,
@@ -39,12 +36,11 @@ class Studio(StudioContext):
         computing: LocalComputing | ChildProcessComputing,
         categories: Sequence[str],
         origin: Mapping[str, Any],
-        robot: Path | None = None,
-        tool_frame: str | None = None,
+        cell: StudioCell | None = None,
     ) -> None:
-        super().__init__(session, server, computing, categories, origin)
+        super().__init__(session, server, computing, categories, origin, cell or StudioCell())
         self.mouse = Mouse(self)
-        self.arm_simulation = ArmSimulation(self, robot, tool_frame)
+        self.arm_simulation = ArmSimulation(self)
         self.panel = Panel(self, self.mouse, self.arm_simulation, lambda: self.worker.cancel())
         working, simulating = self.panel.working, self.panel.simulating
         self.worker = Worker(working.started, working.progress, self._ended(working))

@@ -41,14 +41,14 @@ class Status(Protocol):
 class ArmSimulation:
     """The last simulation: one target's job on the arm.
 
-    robot, tool_frame: of `nrdf.robot.model.arm.load_arm`, the bundled arm unless given.
+    It is that of the studio's cell.
     """
 
     worker: Worker
     """Simulates and saves in the background."""
 
-    def __init__(self, context: StudioContext, robot: Path | None, tool_frame: str | None) -> None:
-        self.context, self._robot, self._tool_frame = context, robot, tool_frame
+    def __init__(self, context: StudioContext) -> None:
+        self.context = context
         self.player = Player(self._advance)
         self.key, self.time_s, self.shown = "", 0.0, False
         self.saved_to: Path | None = None
@@ -92,7 +92,7 @@ class ArmSimulation:
         def work(progress: Progress) -> None:
             progress(0, 1)
             job = save_job(self.context.editor, key, result, self.context.origin)
-            process = SimulationProcess(job, self._robot, self._tool_frame)
+            process = SimulationProcess(job, self.context.cell)
             try:
                 playback = process.run(
                     progress, lambda phase: self._status.describe(f"{what}: {phase}")

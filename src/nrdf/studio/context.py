@@ -26,6 +26,7 @@ from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.model.session import Session
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.teaching import ORIGIN
 from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
@@ -54,7 +55,8 @@ class StudioContext(ABC):
     """The state of a studio, its drawing and its background work; the same for every browser.
 
     server: a viser server with nothing on it yet. computing: what plans and transfers, for objects
-    of one of `categories`. origin: what reports say of how they were made.
+    of one of `categories`. origin: what reports say of how they were made. cell: what simulations
+    and programs are for.
     """
 
     worker: Worker
@@ -67,7 +69,9 @@ class StudioContext(ABC):
         computing: LocalComputing | ChildProcessComputing,
         categories: Sequence[str],
         origin: Mapping[str, Any],
+        cell: StudioCell,
     ) -> None:
+        self.cell = cell
         self.server, self.categories, self.origin = server, tuple(categories), origin
         self.editor = Editor(session)
         self.results = ResultCache(self.editor, computing)

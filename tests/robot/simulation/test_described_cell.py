@@ -10,6 +10,7 @@ import pytest
 from builders.cells import cell_of
 from builders.export_jobs import small_job
 from nrdf.cell.placement import object_pose
+from nrdf.errors import LimitError
 
 pytest.importorskip("mujoco")
 
@@ -54,3 +55,17 @@ def test_distances_from_a_box_are_those_of_points_on_it():
     step = 1e-6
     ahead, _ = Box.distances(box, points + step * direction)
     assert np.allclose((ahead - away) / step, 1.0, atol=1e-3)
+
+
+def test_the_tools_masses_and_the_robots_limits_are_the_cells(monkeypatch):
+    points = np.random.default_rng(0).uniform(-0.2, 0.3, (500, 3))
+    work = SimpleNamespace(job=small_job(), points=points)
+    monkeypatch.setattr(
+        described_cell, "replace", lambda of, **with_: SimpleNamespace(**{**vars(of), **with_})
+    )
+    field, cell = SimpleNamespace(samples=points), cell_of()
+    tools = [tool.model_copy(update={"mass_kg": 1.5}) for tool in cell.tools]
+    _, placement = place_in_cell(cell.model_copy(update={"tools": tools}), work, field)
+    assert placement.loads == {tool.name: (1.5, (0.0, 0.0, 0.0)) for tool in tools}
+    with pytest.raises(LimitError, match=r"above the cell's 1.0 mm/s"):
+        place_in_cell(cell_of(robot={"max_feed_m_s": 0.001}), work, field)

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from nrdf.robot.simulation.scene import SimulatedArm
+
+HOME = np.array([0.0, -1.5, 1.5, -1.2, -1.57, 0.0])
 
 
 def test_the_force_sensor_feels_the_push_and_not_the_weight(cell):
@@ -26,3 +30,12 @@ def test_commanded_joints_are_followed(cell):
     for _ in range(100):
         simulated.step(there, np.zeros(6), np.zeros(6), None, simulated.tip()[0])
     np.testing.assert_allclose(simulated.joints, there, atol=1e-3)
+
+
+@pytest.mark.parametrize("kg", [0.0, 3.0])
+def test_the_arm_carries_the_mass_that_the_tool_is_said_to_have(cell, kg):
+    there = (0.0, 0.02, 0.05)
+    machine = SimulatedArm(replace(cell, tool=replace(cell.tool, load=(kg, there))), HOME)
+    tool = machine.model.body("nrdf_tool").id
+    assert machine.model.body_mass[tool] == pytest.approx(max(kg, 0.05))
+    assert np.allclose(machine.model.body_ipos[tool], there)

@@ -12,6 +12,7 @@ from builders.studio_page import silent
 from nrdf.errors import ProcessError, RobotError
 from nrdf.studio.model import simulation_process
 from nrdf.studio.model.simulation_process import SimulationProcess, require_mujoco
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.worker import Cancelled
 
 # Not by importing it: nrdf must be first, to choose what MuJoCo draws with.
@@ -26,7 +27,7 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
 ):
     monkeypatch.setenv("MUJOCO_GL", "off")  # pictures take long, and have tests of their own
     seen, phases = [], []
-    running = SimulationProcess(plate_job)
+    running = SimulationProcess(plate_job, StudioCell())
     made = running.run(lambda done, total: seen.append(done / total), phases.append)
     assert made.report["total"]["waypoints"] == 27 and made.seconds > 5
     assert sorted(set(seen)) == sorted(set(seen), key=seen.index) and 0 < seen[-1] < 1
@@ -43,11 +44,11 @@ def test_a_simulation_in_its_own_process_is_driven_written_and_ended(
 
 def test_what_the_command_line_refuses_is_refused_alike(tmp_path):
     with pytest.raises(ProcessError, match="empty"):
-        SimulationProcess(tmp_path / "empty").run(silent)
+        SimulationProcess(tmp_path / "empty", StudioCell()).run(silent)
 
 
 def test_cancelling_ends_the_process(plate_job):
-    running = SimulationProcess(plate_job)
+    running = SimulationProcess(plate_job, StudioCell())
 
     def cancelled(done, total):
         raise Cancelled

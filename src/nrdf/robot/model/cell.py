@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Placement:
     base_m: (3,) of the arm's base; base_yaw_rad: about z, from the cell's x to the base's x;
     stand_m: height of the object's lowest point above the floor; turntable_rad: (k,) angles that
     the turntable may stop at. A *turntable index* is an index into them. keep_out: what neither arm
-    nor tool may enter.
+    nor tool may enter. loads: of tools by name, as `Tool.load`.
     """
 
     base_m: tuple[float, float, float]
@@ -60,6 +61,7 @@ class Placement:
     stand_m: float
     turntable_rad: tuple[float, ...]
     keep_out: tuple[Box, ...] = ()
+    loads: Mapping[str, tuple[float, tuple[float, float, float]]] = field(default_factory=dict)
 
     def T_cell_base(self) -> np.ndarray:
         """Pose (4, 4) of the arm's base."""

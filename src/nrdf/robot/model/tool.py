@@ -42,7 +42,8 @@ class Tool:
     """A tool in the frame of the arm's tool frame (its flange).
 
     T_flange_tcp: (4, 4), of the tool centre point, z into the part. radius_m: of what works the
-    surface. presses: whether it touches the surface at all. round: the spin about z is free.
+    surface. presses: whether it touches the surface at all. load: its mass, kg, and the place of
+    its centre (3,), where they are known; else they follow from its parts.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Tool:
     T_flange_tcp: np.ndarray
     presses: bool
     parts: tuple[Part, ...]
+    load: tuple[float, tuple[float, float, float]] | None = None
 
     @property
     def max_tilt_rad(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from nrdf.geometry.frames import quaternions_wxyz
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.model.mujoco_model import mujoco
-from nrdf.robot.model.tool import Part
+from nrdf.robot.model.tool import Tool
 from nrdf.robot.planning.timing import STEP_S
 
 STIFFNESS_1_S = 80.0
@@ -20,6 +20,8 @@ _COLOURS = {
     "pad": (0.90, 0.45, 0.10, 1.0),
     "holder": (0.35, 0.35, 0.38, 1.0),
 }
+_LOAD_RADIUS_M, _LEAST_KG = 0.05, 0.05
+"""A tool whose mass is known turns like a ball of that size."""
 _TOOL, _SENSOR, _FORCE = "nrdf_tool", "nrdf_sensor", "nrdf_force"
 
 
@@ -33,18 +35,22 @@ def cell_specification(cell: Cell) -> Any:
     spec.compiler.boundmass, spec.compiler.boundinertia = 0.05, 1e-4
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
-    _mount(spec.body(cell.arm.body), cell.arm.T_body_flange, cell.tool.parts)
+    _mount(spec.body(cell.arm.body), cell.arm.T_body_flange, cell.tool)
     sensor = spec.add_sensor(name=_FORCE, type=mujoco.mjtSensor.mjSENS_FORCE)
     sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_SITE, _SENSOR
     _add_motors(spec, cell)
     return spec
 
 
-def _mount(body: Any, T_body_flange: np.ndarray, parts: tuple[Part, ...]) -> None:
+def _mount(body: Any, T_body_flange: np.ndarray, held: Tool) -> None:
     tool = body.add_body(name=_TOOL, pos=T_body_flange[:3, 3], gravcomp=1.0)
     tool.quat = quaternions_wxyz(T_body_flange[:3, :3])
     tool.add_site(name=_SENSOR)
-    for part in parts:
+    if held.load is not None:
+        tool.explicitinertial = True
+        tool.mass, tool.ipos = held.load
+        tool.inertia = np.full(3, 0.4 * max(tool.mass, _LEAST_KG) * _LOAD_RADIUS_M**2)
+    for part in held.parts:
         kind = mujoco.mjtGeom.mjGEOM_CYLINDER if part.flat else mujoco.mjtGeom.mjGEOM_CAPSULE
         tool.add_geom(
             name=f"nrdf_{part.name.replace(' ', '_')}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,7 +114,8 @@ def simulate(
     for path, strategy in zip(paths, simulation_job.strategies, strict=True):
         where = f"{path.region}, {path.process}"
         progress(f"{where}: inverse kinematics")
-        cell = Cell.build(arm, tool_of(path), distance_field, placement, upright)
+        tool = replace(tool_of(path), load=placement.loads.get(path.tool))
+        cell = Cell.build(arm, tool, distance_field, placement, upright)
         if library is None or not np.array_equal(library.T_flange_tcp, cell.tool.T_flange_tcp):
             library = SeedLibrary.build(cell, LIBRARY_SIZE, rng)
         joint_paths, covered, reachability = plan_joint_paths(cell, library, path.groups)

@@ -22,6 +22,7 @@ from nrdf.reports.job_folder import job_of, panel_of, write_job_files
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.result_cache import ResultCache, TargetResult
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.teaching import knowledge_of
 from nrdf.viz.picture import Panel, draw_regions
 
@@ -53,11 +54,18 @@ def save_job(editor: Editor, name: str, result: TargetResult, origin: Mapping[st
     return path
 
 
-def save_programs(editor: Editor, name: str, result: TargetResult, formats: Sequence[str]) -> Path:
-    """A target's tool paths in some formats, as `nrdf export` writes them; their folder."""
+def save_programs(
+    editor: Editor, name: str, result: TargetResult, formats: Sequence[str], cell: StudioCell
+) -> Path:
+    """A target's tool paths in some formats, as `nrdf export` writes them; their folder.
+
+    Raises ProcessError where a cell file lacks what the job needs, LimitError for its limits.
+    """
     path = saved_path(editor, name, "programs")
     with output_folder(path, overwrite=True) as folder:
-        export_job(job_of(result.transfer_result), formats, folder)
+        found = result.transfer_result
+        job, options = cell.placed(job_of(found), found.target.points)
+        export_job(job, formats, folder, options)
     return path
 
 

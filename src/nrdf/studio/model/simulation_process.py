@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from nrdf.errors import RobotError
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.worker import Progress
 
 if TYPE_CHECKING:
@@ -26,10 +27,10 @@ def require_mujoco() -> None:
 
 
 class SimulationProcess:
-    """A process that simulates one job on an arm: the bundled one, or that of a file."""
+    """A process that simulates one job in a cell."""
 
-    def __init__(self, job: Path, robot: Path | None = None, tool_frame: str | None = None) -> None:
-        self._child = ChildProcess(_serve, (job, robot, tool_frame), _ended_error)
+    def __init__(self, job: Path, cell: StudioCell) -> None:
+        self._child = ChildProcess(_serve, (job, cell), _ended_error)
 
     def run(self, progress: Progress, say: Callable[[str], None] = lambda what: None) -> Playback:
         """Wait for the simulation; `say` gets the phases of the work. Raises RobotError and
@@ -58,20 +59,19 @@ def _ended_error(why: str) -> RobotError:
     )
 
 
-def _serve(pipe: Connection, job: Path, robot: Path | None, tool_frame: str | None) -> None:
+def _serve(pipe: Connection, job: Path, cell: StudioCell) -> None:
     """In the child process: simulate, then write on request until the studio has ended."""
     simulated: list[Any] = []
-    answer(pipe, lambda: _simulate(pipe, job, robot, tool_frame, simulated))
+    answer(pipe, lambda: _simulate(pipe, job, cell, simulated))
     while simulated:
         request = pipe.recv()
         if request is not None:  # else cancelled after it was written
             answer(pipe, lambda request=request: _write(pipe, simulated[0], *request))  # type: ignore[misc]
 
 
-def _simulate(
-    pipe: Connection, job: Path, robot: Path | None, tool_frame: str | None, kept: list[Any]
-) -> Playback:
+def _simulate(pipe: Connection, job: Path, cell: StudioCell, kept: list[Any]) -> Playback:
     from nrdf.robot.model.arm import load_arm
+    from nrdf.robot.simulation.described_cell import simulate_in_cell
     from nrdf.robot.simulation.job import read_simulation_job
     from nrdf.robot.simulation.simulate import simulate
     from nrdf.studio.model.playback import playback_of
@@ -85,7 +85,10 @@ def _simulate(
         pipe.send(("phase", what))
         pipe.send(("progress", (len(set(seen)) - 1, 2 + len(work.job.paths))))
 
-    simulated = simulate(work, load_arm(robot, tool_frame), progress=phase)
+    if cell.described is None:
+        simulated = simulate(work, load_arm(cell.robot, cell.tool_frame), progress=phase)
+    else:
+        simulated = simulate_in_cell(cell.described, cell.folder, work, phase)
     kept.append(simulated)
     return playback_of(simulated)
 

@@ -73,7 +73,9 @@ class SaveTab:
 
     def _save_programs(self, event: PanelEvent) -> None:
         name, result = self._chosen()
-        folder = save_programs(self.context.editor, name, result, (self.format.value,))
+        folder = save_programs(
+            self.context.editor, name, result, (self.format.value,), self.context.cell
+        )
         file = f"{name}-{self.format.value}.zip"
         event.client.send_file_download(file, zipped(folder), save_immediately=True)
         self._show(folder)
