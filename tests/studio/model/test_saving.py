@@ -23,6 +23,7 @@ from nrdf.studio.model.saving import (
     zipped,
 )
 from nrdf.studio.model.session import Session
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.uploads import read_knowledge_zip
 from nrdf.toolpath.file import read_toolpaths
 
@@ -67,7 +68,7 @@ def test_what_is_saved_can_be_read_by_the_command_line(results):
     assert save_job(editor, "new", result, {}) == place, "it can be saved again"
     assert len(read_toolpaths(place).paths) == 2 and (place / "report.html").is_file()
     assert list(read_bound_knowledge(place / "knowledge.yaml").regions) == ["top", "front"]
-    programs = save_programs(editor, "new", result, ("csv", "urscript"))
+    programs = save_programs(editor, "new", result, ("csv", "urscript"), StudioCell())
     names = zipfile.ZipFile(BytesIO(zipped(programs))).namelist()
     assert any(name.endswith(".csv") for name in names)
     assert all(name.startswith("programs/") for name in names)
