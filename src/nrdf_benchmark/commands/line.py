@@ -23,7 +23,7 @@ def line(
     scale_out: Annotated[tuple[Count, Count], Metavar("OBJECTS WORKERS")] | None = None,
     seed: Seed = 0,
 ) -> None:
-    """Measure a line: objects a minute, memory, what is lost where it is killed, a hostile client.
+    """Measure a line: objects a minute, memory, what kills and attacks cost, a cluster.
 
     Objects are labelled meshes with the knowledge of --cell, or, without --data, small clouds of
     the package's chairs with one process, which cost 1 s each. Each number of workers takes all of
@@ -127,7 +127,7 @@ def _attack(cell: Path, out: Path, requests: int, seed: int) -> dict[str, Any]:
 
 
 def _scale_out(out: Path, speed: dict[str, Any], objects: int, workers: int) -> dict[str, Any]:
-    from nrdf_benchmark.line.scale_out import limits, measure_overhead, simulate
+    from nrdf_benchmark.line.scale_out import draw_scale_out, limits, measure_overhead, simulate
 
     with errors.status("Dask's own time"):
         overhead = measure_overhead()
@@ -150,4 +150,5 @@ def _scale_out(out: Path, speed: dict[str, Any], objects: int, workers: int) -> 
     for row in needs:
         shown.add_row(*row)
     show(shown)
+    draw_scale_out(out / "scale-out.png", seconds, overhead.serial_s, objects)
     return {"overhead": vars(overhead), "simulated": vars(found), "limits": needs}

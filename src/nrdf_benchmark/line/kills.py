@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import json
 import socket
-import subprocess
-import sys
 import threading
 import time
-import urllib.error
 import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
 
 from nrdf.serve.outbox import OBJECT
 from nrdf.serve.store import OUTCOMES
+from nrdf_benchmark.line.light_worker import start
 
-LIGHT = ("-m", "nrdf_benchmark.line.light_worker")
 _OBJECTS_A_KILL = 4
 _SHORTEST_S, _LONGEST_S = 0.2, 2.0
 """From the first sign of work of a process to its end."""
@@ -34,17 +32,17 @@ def kill_runs(cell: Path, folder: Path, kills: int, seed: int) -> dict[str, int]
     inbox.mkdir(parents=True)
     for number in range(_OBJECTS_A_KILL * kills):
         (inbox / f"{number:05}.csv").write_text(f"{number}\n")
-    words = [*LIGHT, "run", str(cell), str(inbox), "--out", str(out), "--workers", "2", "--once"]
+    words = ["run", str(cell), str(inbox), "--out", str(out), "--workers", "1", "--once"]
     rng, done = np.random.default_rng(seed), 0
     for _ in range(kills):
         before = published(out)
-        process = _start(words)
+        process = start(words)
         wait_until(partial(_worked, process, out, before))
         time.sleep(rng.uniform(0.0, _LONGEST_S))
-        done += process.poll() is None
+        done += process.is_alive()
         process.kill()
-        process.wait()
-    _start(words).wait()
+        process.join()
+    start(words).join()
     return {"kills": done, **check_outbox([path.name for path in inbox.iterdir()], out)}
 
 
@@ -60,36 +58,37 @@ def kill_services(cell: Path, folder: Path, kills: int, seed: int) -> dict[str, 
         with serving(cell, out, port) as url:
             killer = threading.Timer(rng.uniform(_SHORTEST_S, _LONGEST_S), url.process.kill)
             killer.start()
-            while url.process.poll() is None:
+            while url.process.is_alive():
                 sent += _send(url, sent)
             done += 1
+    names = [f"{number:05}.csv" for number in range(sent)]
     with serving(cell, out, port):
-        wait_until(lambda: published(out) >= sent, _END_S)
-    return {"kills": done, **check_outbox([f"{number:05}.csv" for number in range(sent)], out)}
+        wait_until(lambda: not check_outbox(names, out)["lost"], _END_S)
+    return {"kills": done, **check_outbox(names, out)}
 
 
-def _worked(process: subprocess.Popen[bytes], out: Path, before: int) -> bool:
-    return published(out) > before or process.poll() is not None
+def _worked(process: BaseProcess, out: Path, before: int) -> bool:
+    return published(out) > before or not process.is_alive()
 
 
 class Url(str):
     """A server's address, with its process."""
 
-    process: subprocess.Popen[bytes]
+    process: BaseProcess
 
 
 @contextmanager
 def serving(cell: Path, out: Path, port: int, *more: str) -> Iterator[Url]:
-    """`nrdf serve` with two light workers, which answers; ended with the block."""
-    words = [*LIGHT, "serve", str(cell), "--out", str(out), "--workers", "2", "--port", str(port)]
+    """`nrdf serve` with a light worker, which answers; ended with the block."""
+    words = ["serve", str(cell), "--out", str(out), "--workers", "1", "--port", str(port)]
     url = Url(f"http://127.0.0.1:{port}")
-    url.process = _start([*words, *more])
+    url.process = start([*words, *more])
     try:
         wait_until(lambda: _answers(f"{url}/healthz"))
         yield url
     finally:
         url.process.terminate()
-        url.process.wait()
+        url.process.join()
 
 
 def free_port() -> int:
@@ -128,11 +127,6 @@ def check_outbox(names: Sequence[str], out: Path) -> dict[str, int]:
         "twice": sum(count - 1 for count in sources.values()),
         "halves": halves,
     }
-
-
-def _start(words: Sequence[str]) -> subprocess.Popen[bytes]:
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen([sys.executable, *words], stdout=quiet, stderr=quiet)
 
 
 def wait_until(until: Callable[[], bool], seconds: float = _START_S) -> None:

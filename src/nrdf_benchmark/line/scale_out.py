@@ -22,7 +22,7 @@ from nrdf.serve.store import ObjectRow
 from nrdf.serve.summary import csv_text
 from nrdf.tasks import run_tasks
 
-_TASKS, _FEW = 2000, 100
+_TASKS, _FEW, _DRAWN = 2000, 100, 100_000
 _START_S = 10.0
 """A worker's, until it has loaded its models."""
 _DEATHS_A_DAY = 1.0
@@ -129,3 +129,26 @@ def _outcome_bytes() -> float:
     used = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
     return used / count
+
+
+def draw_scale_out(path: Path, seconds: Sequence[float], serial_s: float, objects: int) -> None:
+    """Hours that so many objects take, by the number of workers, beside what they would if nothing
+    but they took time."""
+    from matplotlib.figure import Figure
+
+    counts = [2**n for n in range(3, 13)]
+    few = min(objects, _DRAWN)
+    hours = [simulate(seconds, serial_s, few, n).hours * objects / few for n in counts]
+    ideal = [float(np.mean(seconds)) * objects / n / 3600.0 for n in counts]
+    figure = Figure((6.0, 3.2), layout="constrained")
+    axes = figure.subplots()
+    axes.loglog(counts, ideal, "--", color="0.6", label="workers alone")
+    axes.loglog(counts, hours, "o-", color="#1f6f8b", label="simulated")
+    axes.axvline(float(np.mean(seconds)) / serial_s, color="#c0504d", lw=1)
+    axes.set(xlabel="workers", ylabel=f"hours for {objects:,} objects")
+    axes.text(
+        0.98, 0.95, "red: as many as one scheduler feeds", transform=axes.transAxes, ha="right",
+        va="top", color="#c0504d", fontsize=8,
+    )  # fmt: skip
+    axes.legend(loc="lower left", frameon=False)
+    figure.savefig(path, dpi=150)

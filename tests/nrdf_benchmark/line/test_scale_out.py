@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nrdf_benchmark.line import scale_out
-from nrdf_benchmark.line.scale_out import limits, measure_overhead, simulate
+from nrdf_benchmark.line.scale_out import draw_scale_out, limits, measure_overhead, simulate
 
 
 def test_hours_follow_from_work_and_workers(monkeypatch):
@@ -40,3 +40,9 @@ def test_overhead_is_what_more_tasks_cost(monkeypatch):
     monkeypatch.setattr(scale_out, "_processor_time", lambda n: (1.0 + 0.001 * n, 2.0 + 0.002 * n))
     found = measure_overhead()
     assert found.serial_s == pytest.approx(0.001) and found.whole_s == pytest.approx(0.003)
+
+
+def test_the_picture_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setattr(scale_out, "_DRAWN", 1000)
+    draw_scale_out(tmp_path / "a.png", [1.0, 2.0], 0.001, 10**6)
+    assert (tmp_path / "a.png").stat().st_size > 10_000
