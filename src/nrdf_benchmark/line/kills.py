@@ -20,7 +20,7 @@ from nrdf.serve.outbox import OBJECT
 from nrdf.serve.store import OUTCOMES
 from nrdf_benchmark.line.light_worker import start
 
-_OBJECTS_A_KILL = 4
+_OBJECTS_A_KILL = 16
 _SHORTEST_S, _LONGEST_S = 0.2, 2.0
 """From the first sign of work of a process to its end."""
 _START_S, _END_S, _ASK_S = 120.0, 300.0, 5.0

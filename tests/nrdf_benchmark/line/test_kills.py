@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from nrdf_benchmark.line import kills
 from nrdf_benchmark.line.kills import check_outbox, kill_runs, published
 from nrdf_benchmark.line.objects import write_light_cell
 
@@ -23,6 +24,8 @@ def test_lost_doubled_and_half_written_objects_are_counted(tmp_path):
     assert published(out) == 4
 
 
-def test_a_run_that_is_killed_loses_nothing(tmp_path):
+def test_a_run_that_is_killed_loses_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(kills, "_OBJECTS_A_KILL", 5)
+    monkeypatch.setattr(kills, "_LONGEST_S", 0.3)
     found = kill_runs(write_light_cell(tmp_path), tmp_path / "kills", 1, 0)
-    assert found == {"kills": 1, "objects": 4, "lost": 0, "twice": 0, "halves": 0}
+    assert found == {"kills": 1, "objects": 5, "lost": 0, "twice": 0, "halves": 0}
