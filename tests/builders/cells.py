@@ -30,7 +30,11 @@ BASE = {
             "name": "gun",
             "tcp_m": [0, 0, 0.25],
             "switches": [
-                {"during": "line", "kinds": ["paint"], "outputs": {"urscript": "2"}},
+                {
+                    "during": "line",
+                    "kinds": ["paint"],
+                    "outputs": {"urscript": "2", "rapid": "doGun", "krl": "18"},
+                },
                 {
                     "during": "contact",
                     "on": {"krl": ["FORCE_ON({force_n})"]},

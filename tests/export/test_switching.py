@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from builders.cells import cell_of
@@ -13,6 +14,7 @@ from nrdf.cell.placement import place_job
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options, options_of_cell
 from nrdf.export.registry import export_job
+from nrdf.toolpath.types import Segment
 
 
 def written(tmp_path, name, job=None, **changes):
@@ -106,3 +108,31 @@ def test_options_of_a_cell_are_checked_and_the_command_line_comes_first():
             options_of_cell(cell_of(programs={"options": wrong}))
     with pytest.raises(ProcessError, match="blend-mm"):
         options_of_cell(cell_of(programs={"options": {"blend_mm": 500}}))
+
+
+@pytest.mark.parametrize(
+    ("name", "on", "off"),
+    [
+        ("urscript", "set_standard_digital_out(2, True)", "set_standard_digital_out(2, False)"),
+        ("rapid", ",doGun,1;", ",doGun,0;"),
+        ("krl", "DO $OUT[18]=TRUE", "DO $OUT[18]=FALSE"),
+    ],
+)
+def test_a_gun_is_switched_as_the_robot_passes_the_ends_of_a_line(tmp_path, name, on, off):
+    job = painted(force_n=None)
+    (path,) = job.paths
+    x = np.linspace(0.0, 0.2, 5)
+    held = np.tile([1.0, 0.0, 0.0, 0.0], (5, 1))
+    places = np.stack([x, 0.0 * x, 0.0 * x + 0.3], axis=1)
+    line = Segment("process", 0, places, held, 0.3, tool_on=np.array([0, 1, 1, 1, 0], bool))
+    high = np.concatenate([places[:1] + 0.1, places[:1]])
+    down = Segment("approach", 0, high, held[:2], 0.3)
+    job = replace(job, paths=(replace(path, segments=(down, line)),))
+    lines = written(tmp_path, name, job)
+    (first,) = (k for k, text in enumerate(lines) if text.endswith(on))
+    (last,) = (k for k, text in enumerate(lines) if text.endswith(off))
+    blended = {"urscript": "r=0.00100", "rapid": "nrdf_zone", "krl": "C_DIS"}[name]
+    moves = [k for k, text in enumerate(lines) if text.lower().startswith(("movel", "lin "))]
+    inside = [k for k in moves if first < k < last or (name == "rapid" and k == last)]
+    assert len(inside) == 2
+    assert all(blended in lines[k] for k in moves if first - 1 <= k <= last)

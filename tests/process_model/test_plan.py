@@ -15,6 +15,7 @@ from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import Target
 from nrdf.process_model.result_model import ResultModel
+from nrdf.process_model.run_up import fastest_from_rest, rooms_for
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -82,8 +83,11 @@ def test_lines_are_chosen_by_what_they_leave(region):
     taught, limits = plan_on_mesh(region, TAUGHT), FeedLimits(acceleration_m_s2=0.2)
     within = {}
     for own in strategies_for(TAUGHT, GUN):
-        model = ResultModel.of(region, plan_on_mesh(region, own), GUN)
-        within[own.stepover_m] = model.measure(TARGET, feeds_for(model, TARGET, limits)).within
+        lines = plan_on_mesh(region, own)
+        model = ResultModel.of(region, lines, GUN)
+        rooms = rooms_for(lines, region.parent, GUN.standoff_m)
+        feeds = feeds_for(model, TARGET, limits, fastest_from_rest(model.moves, rooms, limits))
+        within[own.stepover_m] = model.measure(TARGET, feeds).within
     made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, limits)
     assert made.strategy.stepover_m == max(within, key=within.__getitem__)
     assert made.metrics.within == pytest.approx(max(within.values()))

@@ -128,8 +128,8 @@ def segment_with(**changes):
     "change, message",
     [
         (
-            lambda c: c.update(version=6),
-            "version 6; this nrdf reads versions up to 5: update nrdf",
+            lambda c: c.update(version=7),
+            "version 7; this nrdf reads versions up to 6: update nrdf",
         ),
         (lambda c: c.pop("version"), "version: is missing"),
         (lambda c: c.update(speed=1), "unknown key 'speed'"),

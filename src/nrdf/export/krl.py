@@ -51,6 +51,7 @@ _DIALECT = Dialect(
     "krl",
     lambda signal, on: f"$OUT[{signal}]={'TRUE' if on else 'FALSE'}",
     lambda seconds: f"WAIT SEC {number(seconds, 3)}",
+    in_passing=True,
 )
 
 
@@ -97,9 +98,12 @@ def _path(path: ToolPath, options: Options) -> list[str]:
             lines += [f"$VEL.CP={set_to}", f"PTP {frame}{' C_DIS' if rounded else ''}"]
             arriving = False
         lines += switched.before(i - 1)
-        for (frame, rounded), feed in moves:
+        for k, ((frame, rounded), feed) in enumerate(moves, start=1):
             if set_to != (set_to := number(feed, 6)):
                 lines.append(f"$VEL.CP={set_to}")
+            if k == len(moves) and i - 1 in switched.passing:
+                output = _DIALECT.output(*switched.passing[i - 1])
+                lines.append(f"TRIGGER WHEN DISTANCE=1 DELAY=0 DO {output}")
             lines.append(f"LIN {frame}{' C_DIS' if rounded else ''}")
         if segment.dwell_s:
             lines.append(f"WAIT SEC {number(segment.dwell_s, 3)}")

@@ -43,6 +43,7 @@ _DIALECT = Dialect(
     "rapid",
     lambda signal, on: f"SetDO {signal},{int(on)};",
     lambda seconds: f"WaitTime {number(seconds, 3)};",
+    in_passing=True,
 )
 _LONGEST = 32
 _REST = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
@@ -118,8 +119,11 @@ def _path(path: ToolPath, options: Options, speeds: dict[str, str], how: str) ->
             arriving = False
         lines += switched.before(i - 1)
         force = segment.force_n if _presses(options) else None
-        for target, zone, speed in targets:
-            if force is None and pressing:
+        for k, (target, zone, speed) in enumerate(targets, start=1):
+            if k == len(targets) and i - 1 in switched.passing:
+                signal, on = switched.passing[i - 1]
+                lines.append(f"MoveLDO {target},{speed},{zone},{how},{signal},{int(on)};")
+            elif force is None and pressing:
                 lines.append(f"FCPressEnd {target},{speed},{how};")
                 pressing = False
             elif force is None:

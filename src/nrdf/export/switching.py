@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from nrdf.cell.tools import CellTool, Switch, SwitchedFormat
 from nrdf.export.header import revolutions_per_minute
 from nrdf.export.names import number, plain_text
 from nrdf.export.options import Options
+from nrdf.geometry.frames import unit_vectors
 from nrdf.toolpath.types import Segment, ToolPath
+
+_SAME_M, _STRAIGHT = 1e-9, 0.95  # cosine between steps of a way that goes on
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a format writes an output, by its signal and state, and a wait in seconds."""
+    """How a format writes an output, by its signal and state, and a wait in seconds. in_passing:
+    whether its outputs can change while the robot passes a waypoint."""
 
     name: SwitchedFormat
     output: Callable[[str, bool], str]
     wait: Callable[[float], str]
+    in_passing: bool = False
 
 
 @dataclass(frozen=True)
@@ -26,19 +33,22 @@ class Switching:
     """The lines around one path and its segments.
 
     stops: indices of segments after which the robot must arrive, since something is switched there.
+    passing: by the index of a segment, the signal and state of an output that changes as the robot
+    passes its last waypoint, at speed.
     """
 
     path: ToolPath
     switches: tuple[Switch, ...]
     dialect: Dialect
     stops: frozenset[int]
+    passing: Mapping[int, tuple[str, bool]]
 
     def before(self, index: int) -> list[str]:
         """Before the segment `index` is driven: what begins with it."""
         return [
             line
             for switch in self.switches
-            if index in _begins(switch, self.path)
+            if index in _begins(switch, self.path) and index - 1 not in self.passing
             for line in self._lines(switch, self.path.segments[index], True)
         ]
 
@@ -47,7 +57,7 @@ class Switching:
         return [
             line
             for switch in reversed(self.switches)
-            if index in _ends(switch, self.path)
+            if index in _ends(switch, self.path) and index not in self.passing
             for line in self._lines(switch, self.path.segments[index], False)
         ]
 
@@ -74,9 +84,27 @@ def switching(path: ToolPath, options: Options, dialect: Dialect) -> Switching:
     tool = cell_tool(path, options)
     switches = [] if tool is None else [s for s in tool.switches if _concerns(s, path)]
     switches = [switch for switch in switches if switch.switches(dialect.name)]
-    places = {i - 1 for switch in switches for i in _begins(switch, path)}
-    places |= {i for switch in switches for i in _ends(switch, path)}
-    return Switching(path, tuple(switches), dialect, frozenset(places))
+    places = [(i - 1, switch, True) for switch in switches for i in _begins(switch, path)]
+    places += [(i, switch, False) for switch in switches for i in _ends(switch, path)]
+    stops = [i for i, _, _ in places]
+    passing = {
+        i: (switch.outputs[dialect.name], on)  # type: ignore[index]
+        for i, switch, on in places
+        if dialect.in_passing and stops.count(i) == 1 and _goes_on(path, i)
+        and dialect.name not in switch.on and not (switch.wait_on_s if on else switch.wait_off_s)
+    }  # fmt: skip
+    return Switching(path, tuple(switches), dialect, frozenset({*stops} - {*passing}), passing)
+
+
+def _goes_on(path: ToolPath, index: int) -> bool:
+    """Whether the way goes on straight from a segment to the next one."""
+    if not 0 <= index < len(path.segments) - 1:
+        return False
+    segment, after = path.segments[index], path.segments[index + 1]
+    places = np.concatenate([segment.positions[-2:], after.positions[:2]])
+    steps = np.diff(places, axis=0)
+    steps = unit_vectors(steps[np.linalg.norm(steps, axis=1) > _SAME_M])
+    return len(steps) > 1 and bool((steps[1:] @ steps[0] > _STRAIGHT).all())
 
 
 def cell_tool(path: ToolPath, options: Options) -> CellTool | None:

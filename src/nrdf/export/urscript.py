@@ -48,6 +48,7 @@ _DIALECT = Dialect(
     "urscript",
     lambda signal, on: f"set_standard_digital_out({signal}, {on})",
     lambda seconds: f"sleep({number(seconds, 3)})",
+    in_passing=True,
 )
 _JOINT_SPEED = "a=0.5, v=0.3"
 
@@ -145,6 +146,8 @@ def _path(path: ToolPath, options: Options) -> list[str]:
             lines += _press(into * segment.force_n) if segment.force_n is not None else []
             force = segment.force_n
         lines += [f"movel({pose}, {how})" for pose, how in moves]
+        if i - 1 in switched.passing:  # the script goes on where the robot begins to round a place
+            lines.append(_DIALECT.output(*switched.passing[i - 1]))
         if segment.dwell_s:
             lines.append(f"sleep({number(segment.dwell_s, 3)})")
         lines += switched.after(i - 1)

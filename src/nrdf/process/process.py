@@ -125,6 +125,8 @@ class Process(Quantities):
     """Distance between waypoints along a line."""
     edge_margin_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Kept free inside the region's border; gaps that the footprint does not fit into are none."""
+    steady_m: Annotated[NotNegative, _LENGTH] = 0.0
+    """The tool's axis follows the surface averaged that far to either side along a line."""
     run_off_m: Annotated[NotNegative, _LENGTH] = 0.0
     """Lines go on that far beyond their ends, along the surface's tangent."""
     run_off_height_m: Annotated[NotNegative, _LENGTH] = 0.0

@@ -69,7 +69,7 @@ def with_lines_of(process: Process, planned: PlannedResult) -> Process:
     if process.trajectory == "taught":
         return process
     lines = planned.strategy
-    names = ("stepover_m", "run_off_m", "line_order", "join_gap_m", "constant_speed")
+    names = ("stepover_m", "steady_m", "run_off_m", "line_order", "join_gap_m", "constant_speed")
     changes: dict[str, object] = {name: getattr(lines, name) for name in names}
     return process.model_copy(update={**changes, "overlap": None})
 

@@ -44,6 +44,7 @@ def strategy_of(process: Process, direction: np.ndarray | None = None) -> Strate
         origin_m=None if process.origin_m is None else np.asarray(process.origin_m, float),
         line_order=process.order_of_lines,
         heading=process.heading,
+        steady_m=process.steady_m,
         run_off_m=process.run_off_m,
         run_off_height_m=process.run_off_height_m,
         lead_in_radius_m=process.lead_in_radius_m,

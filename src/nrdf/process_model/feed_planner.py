@@ -49,10 +49,12 @@ class FeedLimits:
 @dataclass(frozen=True)
 class FeedWeights:
     """What else counts, beside the squared deviation's mean over the area. spill: film wasted for
-    film wanted; change: mean squared change of slowness from move to move, in typical ones."""
+    film wanted; change: mean squared change of slowness from move to move, in typical ones; apart:
+    mean squared distance from the typical one, so that no line runs fast beside slow ones."""
 
     spill: float = 0.05
     change: float = 0.02
+    apart: float = 0.2
 
 
 def plan_feeds(
@@ -65,12 +67,14 @@ def plan_feeds(
     moves: Moves,
     limits: FeedLimits,
     weights: FeedWeights | None = None,
+    fastest_m_s: np.ndarray | float = np.inf,
 ) -> np.ndarray:
     """Feeds (m,), m/s, of all moves.
 
     matrix: (n, m), m², from slowness to film on the region's cells; fixed: (n,), m, what dwells
     leave there; areas_m2: (n,). spill_m3: (m,) what each move leaves elsewhere, for each second a
-    metre. Never raises for a target out of reach: the feeds are then the nearest within the limits.
+    metre. fastest_m_s: (m,), where moves have limits of their own. Never raises for a target out of
+    reach: the feeds are then the nearest within the limits.
     """
     weights = weights or FeedWeights()
     share = areas_m2 / areas_m2.sum()
@@ -83,8 +87,10 @@ def plan_feeds(
     change = _changes(moves, weights.change)
     pull = (change.T @ change).tocsr()
 
-    turning = 1.0 / np.sqrt(_most_at_turns(moves, limits)) / usual
-    lowest = np.clip(turning, 1.0 / limits.most_m_s / usual, 1.0 / limits.least_m_s / usual)
+    fastest = np.minimum(np.sqrt(_most_at_turns(moves, limits)), fastest_m_s)
+    lowest = np.clip(
+        1.0 / fastest / usual, 1.0 / limits.most_m_s / usual, 1.0 / limits.least_m_s / usual
+    )
     highest = np.full(len(lowest), 1.0 / limits.least_m_s / usual)
     joined, gain = _gains(moves, limits)
     first, second = joined, joined + 1
@@ -93,8 +99,11 @@ def plan_feeds(
         off = per @ x + start
         beyond = np.sign(off) * np.maximum(np.abs(off) - band, 0.0)
         pulled = pull @ x
+        apart = x - 1.0
         value = share @ (off**2 + _MORE * beyond**2) + wasted @ x + x @ pulled
+        value += weights.apart * float(apart @ apart) / len(x)
         slope = back @ (2.0 * share * (off + _MORE * beyond)) + wasted + 2.0 * pulled
+        slope += 2.0 * weights.apart / len(x) * apart
         squared = (usual * x) ** -2
         rise = (squared[second] - squared[first]) / gain
         over = np.sign(rise) * np.maximum(np.abs(rise) - _ALLOWED, 0.0)
@@ -108,7 +117,7 @@ def plan_feeds(
         cost, np.clip(np.ones(len(lowest)), lowest, highest), jac=True, method="L-BFGS-B",
         bounds=np.stack([lowest, highest], axis=1), options={"maxiter": _STEPS, "maxcor": 20},
     )  # fmt: skip
-    feeds = within_acceleration(1.0 / (usual * solved.x), moves, limits)
+    feeds = within_acceleration(np.minimum(1.0 / (usual * solved.x), fastest), moves, limits)
     return np.asarray(np.clip(feeds, limits.least_m_s, limits.most_m_s))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -36,7 +36,8 @@ class ToolSamples:
 
 @dataclass(frozen=True)
 class Moves:
-    """All moves between neighbouring waypoints of process segments, and stops at their ends.
+    """All moves between neighbouring waypoints of process segments at which the tool is on, and
+    stops at their ends.
 
     lengths_m, feeds_m_s: (m,). segment: (m,), which of the segments. turns_rad: (m,), by how far
     the way turns from a move to the next one of its segment; 0 for the last. pressed: (m,), false
@@ -66,7 +67,8 @@ class Moves:
         parts: list[ToolSamples] = []
         stops: list[ToolSamples] = []
         count = 0
-        for number, segment in enumerate(work):
+        for number, whole in enumerate(work):
+            segment = _applied(whole)
             step = step_lengths(segment.positions)
             lengths.append(step)
             feeds.append(segment.speeds_m_s[1:])
@@ -94,6 +96,23 @@ class Moves:
     def seconds(self) -> float:
         """Time of all moves and stops."""
         return float((self.lengths_m / self.feeds_m_s).sum() + self.stops.weights.sum())
+
+
+def _applied(segment: Segment) -> Segment:
+    """A process segment without what is driven with the tool off, before and after it."""
+    on = np.flatnonzero(segment.applies)
+    if segment.tool_on is None or not len(on):
+        return segment
+    kept = slice(on[0], on[-1] + 1)
+    feeds, over = segment.feeds_m_s, segment.on_surface
+    return replace(
+        segment,
+        positions=segment.positions[kept],
+        quaternions_xyzw=segment.quaternions_xyzw[kept],
+        feeds_m_s=None if feeds is None else feeds[kept],
+        on_surface=None if over is None else over[kept],
+        tool_on=None,
+    )
 
 
 def _turns(positions: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import ResultMetrics, Target
 from nrdf.process_model.result_model import ResultModel, Tool, cells_for, with_feeds
+from nrdf.process_model.run_up import fastest_from_rest, rooms_for, with_run_up
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -29,6 +30,7 @@ from nrdf.toolpath.strategy import LineOrder, Strategy
 from nrdf.toolpath.types import Segment
 
 _RUN_OFF = 0.5  # half-widths along the travel: slower ends do the rest
+_STEADY = 1.0  # half-widths over which a gun's axis is averaged: its fan covers as much at once
 _STEPOVERS = (1.5, 1.0)
 """Times the stepover of theory that are tried. Lines farther apart are driven slower, which
 leaves the arm more time to change its speed; finer ones are more even."""
@@ -71,8 +73,20 @@ def plan_by_result(
     plain_feeds = constant_feeds(before, target, limits)
     plain = before.measure(target, plain_feeds)
 
+    def rooms_of(lines: Sequence[Segment]) -> np.ndarray:
+        if replan and isinstance(tool, SprayProfile):
+            return rooms_for(lines, region.parent, tool.standoff_m)
+        return np.zeros((sum(segment.kind == "process" for segment in lines), 2))
+
+    def fastest_of(model: ResultModel, rooms: np.ndarray) -> np.ndarray:
+        if isinstance(tool, SprayProfile):
+            return fastest_from_rest(model.moves, rooms, limits)
+        return np.full(len(model.moves.lengths_m), np.inf)  # a pad's force follows its speed
+
     def planned(lines: Sequence[Segment], own: Strategy, model: ResultModel) -> PlannedResult:
-        return _driven(lines, own, model, feeds_for(model, target, limits), target, plain)
+        rooms = rooms_of(lines)
+        feeds = feeds_for(model, target, limits, fastest_of(model, rooms))
+        return _driven(lines, own, model, feeds, rooms, target, limits, plain)
 
     if not replan:
         return planned(taught, strategy, before)
@@ -91,7 +105,10 @@ def plan_by_result(
         assert fault is not None
         raise fault
     if plain.within > best.metrics.within:  # what is taught is never made worse
-        best = _driven(taught, strategy, before, plain_feeds, target, plain)
+        rooms = rooms_of(taught)
+        feeds = np.minimum(plain_feeds, fastest_of(before, rooms))
+        made = _driven(taught, strategy, before, feeds, rooms, target, limits, plain)
+        best = made if made.metrics.within > best.metrics.within else best
     return best
 
 
@@ -100,23 +117,29 @@ def _driven(
     strategy: Strategy,
     model: ResultModel,
     feeds: np.ndarray,
+    rooms_m: np.ndarray,
     target: Target,
+    limits: FeedLimits,
     taught: ResultMetrics,
 ) -> PlannedResult:
-    """Lines driven at feeds (m,) of their moves."""
+    """Lines driven at feeds (m,) of their moves, from rest and to rest within rooms (s, 2)."""
     segments = with_feeds(lines, model.moves, feeds)
+    if model.flow_m3_s > 0.0:
+        segments = with_run_up(segments, rooms_m, limits.acceleration_m_s2)
     model = replace(model, moves=replace(model.moves, feeds_m_s=feeds))
     return PlannedResult(segments, strategy, model, model.measure(target), taught)
 
 
-def feeds_for(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
-    """Feeds (m,), m/s, with which a path comes nearest to a target. Raises ProcessError where it is
-    out of reach."""
+def feeds_for(
+    model: ResultModel, target: Target, limits: FeedLimits, fastest_m_s: np.ndarray | float = np.inf
+) -> np.ndarray:
+    """Feeds (m,), m/s, with which a path comes nearest to a target, none above `fastest_m_s` (m,).
+    Raises ProcessError where it is out of reach."""
     check_in_reach(model, target, limits)
     inside = model.cells.inside
     return plan_feeds(
         model.on_region, model.fixed[inside], model.region_areas_m2, model.spill_m3(),
-        target.value_m, target.tolerance_m, model.moves, limits,
+        target.value_m, target.tolerance_m, model.moves, limits, fastest_m_s=fastest_m_s,
     )  # fmt: skip
 
 
@@ -138,13 +161,15 @@ def strategies_for(strategy: Strategy, tool: Tool) -> list[Strategy]:
     The tool lifts between lines: where it turns without lifting it must slow down, and leaves too
     much at every reversal.
     """
-    run_off = strategy.run_off_m
+    run_off, steady = strategy.run_off_m, strategy.steady_m
     if isinstance(tool, SprayProfile):
         run_off = _RUN_OFF * tool.ends_m[1]
+        steady = max(steady, _STEADY * tool.ends_m[1])
     order: LineOrder = "one-way" if strategy.line_order == "one-way" else "snake"
     lines = replace(
-        strategy, run_off_m=run_off, line_order=order, join_gap_m=0.0, constant_speed=False
-    )
+        strategy, run_off_m=run_off, steady_m=steady, line_order=order, join_gap_m=0.0,
+        constant_speed=False,
+    )  # fmt: skip
     even = best_stepover(tool)
     tried = [times * even for times in _STEPOVERS]
     if not any(abs(strategy.stepover_m / stepover - 1.0) < _SAME for stepover in tried):

@@ -34,11 +34,11 @@ from nrdf.toolpath.strategy import (
 )
 from nrdf.toolpath.types import Job, Segment, SegmentKind, ToolPath
 
-VERSION = 5
+VERSION = 6
 """Since 2 a job says how its object lies in its frame (`Job.pose`); since 3 a path has its
 strategy; since 4 that has the settings of modifiers; since 5 waypoints may have feeds of their own
 and be off the surface, a strategy has an origin and resampling, and a path the kind of its
-process."""
+process; since 6 waypoints may have their tool off."""
 FILE = "toolpaths.json"
 _LARGEST_FILE = 1 << 28
 _MOST_COMPLAINTS = 5
@@ -159,6 +159,7 @@ class _SegmentContent(StrictModel):
     dwell_s: _AtLeastZero = 0.0
     feeds_m_s: list[_AboveZero] | None = None
     on_surface: list[bool] | None = None
+    tool_on: list[bool] | None = None
 
     def made(self, where: str) -> Segment:
         if len(self.positions_m) != len(self.quaternions_xyzw):
@@ -166,23 +167,19 @@ class _SegmentContent(StrictModel):
                 f"{where} has {len(self.positions_m)} positions_m, but "
                 f"{len(self.quaternions_xyzw)} quaternions_xyzw; each position needs one"
             )
-        if self.feeds_m_s is not None and len(self.feeds_m_s) != len(self.positions_m):
-            raise ProcessError(
-                f"{where} has {len(self.positions_m)} positions_m, but {len(self.feeds_m_s)} "
-                "feeds_m_s; each position needs one, or leave them out"
-            )
         content = {name: getattr(self, name) for name in type(self).model_fields}
         positions = np.array(content.pop("positions_m"), dtype=np.float64)
         content["quaternions_xyzw"] = np.array(content["quaternions_xyzw"], dtype=np.float64)
-        if self.on_surface is not None and len(self.on_surface) != len(self.positions_m):
-            raise ProcessError(
-                f"{where} has {len(self.positions_m)} positions_m, but {len(self.on_surface)} "
-                "on_surface; each position needs one, or leave them out"
-            )
-        if self.feeds_m_s is not None:
-            content["feeds_m_s"] = np.array(self.feeds_m_s, dtype=np.float64)
-        if self.on_surface is not None:
-            content["on_surface"] = np.array(self.on_surface, dtype=bool)
+        for name, kind in (("feeds_m_s", np.float64), ("on_surface", bool), ("tool_on", bool)):
+            values = content[name]
+            if values is None:
+                continue
+            if len(values) != len(positions):
+                raise ProcessError(
+                    f"{where} has {len(positions)} positions_m, but {len(values)} {name}; each "
+                    "position needs one, or leave them out"
+                )
+            content[name] = np.array(values, dtype=kind)
         return Segment(positions=positions, **content)
 
 
@@ -213,6 +210,7 @@ class _StrategyContent(StrictModel):
     origin_m: _Position | None = None
     line_order: LineOrder = "snake"
     heading: Heading = "travel"
+    steady_m: float = 0.0
     run_off_m: float = 0.0
     run_off_height_m: float = 0.0
     lead_in_radius_m: float = 0.0

@@ -27,6 +27,7 @@ from nrdf.toolpath.modifiers import (
     smooth_orientation,
     split,
     start_at,
+    steady_normals,
 )
 from nrdf.toolpath.modifiers.join import Project
 from nrdf.toolpath.modifiers.one_way import begun_near
@@ -97,6 +98,7 @@ def modified(
     project, step = _projection(region, strategy), _LARGEST_STEP * strategy.spacing_m
     turn, spacing, radius = strategy.largest_turn_rad_m, strategy.spacing_m, strategy.tool_radius_m
     paths = smooth_orientation(split(paths, step), turn)
+    paths = steady_normals(paths, strategy.steady_m)
     points, faces = sample_evenly(region.mesh, radius / _PER_RADIUS)
     outward = region.mesh.face_normals[faces]
     paths = minimum_length(

@@ -30,7 +30,7 @@ _ABOVE_ZERO = (
 )  # fmt: skip
 _AT_LEAST_ZERO = (
     "edge_margin_m", "clearance_m", "standoff_m", "approach_distance_m", "retract_distance_m",
-    "dwell_s", "run_off_m", "run_off_height_m", "lead_in_radius_m", "lead_out_radius_m",
+    "dwell_s", "steady_m", "run_off_m", "run_off_height_m", "lead_in_radius_m", "lead_out_radius_m",
     "edge_contact_m", "chord_error_m", "resample_step_m", "minimum_length_m", "join_gap_m",
     "body_radius_m", "body_length_m",
 )  # fmt: skip
@@ -63,7 +63,8 @@ class Strategy:
     centre point to the surface along the tool's axis. offset_m: along the surface's normal,
     outward. drag_m: the tool's centre runs that far ahead of its contact; edge_contact_m: a tilted
     disc touches with its edge, that far from its centre.
-    run_off_m: lines go on that far beyond their ends, and rise run_off_height_m there.
+    steady_m: normals are averaged that far to either side along a line, so that the axis turns
+    steadily. run_off_m: lines go on that far beyond their ends, and rise run_off_height_m there.
     lead_in_radius_m, lead_out_radius_m: of the arcs on which the tool lands and leaves.
     largest_turn_rad_m: of the tool's axis, for each m of the way. chord_error_m: of the straight
     way between waypoints, 0 where they are evenly spaced. resample_step_m: waypoints are left out
@@ -102,6 +103,7 @@ class Strategy:
     origin_m: np.ndarray | None = None
     line_order: LineOrder = "zigzag"
     heading: Heading = "travel"
+    steady_m: float = 0.0
     run_off_m: float = 0.0
     run_off_height_m: float = 0.0
     lead_in_radius_m: float = 0.0

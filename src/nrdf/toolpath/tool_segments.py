@@ -177,7 +177,7 @@ def _backwards(line: Segment, normals: np.ndarray, strategy: Strategy) -> Segmen
     if strategy.heading == "travel":
         half = Rotation.from_rotvec(np.pi * normals[::-1])
         quaternions = without_sign_jumps((half * Rotation.from_quat(quaternions)).as_quat())
-    feeds, over = line.feeds_m_s, line.on_surface
+    feeds, over, on = line.feeds_m_s, line.on_surface, line.tool_on
     return replace(
         line,
         positions=line.positions[::-1],
@@ -185,6 +185,7 @@ def _backwards(line: Segment, normals: np.ndarray, strategy: Strategy) -> Segmen
         # A feed is that of the way to its waypoint.
         feeds_m_s=None if feeds is None else np.append(feeds[-1:], feeds[:0:-1]),
         on_surface=None if over is None else over[::-1],
+        tool_on=None if on is None else on[::-1],
     )
 
 

@@ -43,6 +43,8 @@ class Segment:
     dwell_s: pause at the segment's last waypoint.
     on_surface: (n,) bool, where the tool is over the surface that it works; false where a process
         segment runs off the part, or turns beyond its edge without lifting. None: everywhere.
+    tool_on: (n,) bool, where a gun is on; false where a process segment runs up to its speed before
+        the gun goes on, and slows down after it. None: all along.
     """
 
     kind: SegmentKind
@@ -54,14 +56,25 @@ class Segment:
     dwell_s: float = 0.0
     feeds_m_s: np.ndarray | None = None
     on_surface: np.ndarray | None = None
+    tool_on: np.ndarray | None = None
+
+    @property
+    def applies(self) -> np.ndarray:
+        """Whether (n,) the tool is on at each waypoint of a process segment; nowhere on free
+        moves."""
+        on = np.full(len(self.positions), self.kind == "process")
+        return on if self.tool_on is None else on & self.tool_on
+
+    @property
+    def runs_up(self) -> bool:
+        """Whether it is of a gun that goes on and off at speed."""
+        return self.tool_on is not None and self.force_n is None
 
     @property
     def over_surface(self) -> np.ndarray:
-        """Whether (n,) the tool is over the surface at each waypoint of a process segment; nowhere
-        on free moves."""
-        if self.on_surface is not None:
-            return self.on_surface
-        return np.full(len(self.positions), self.kind == "process")
+        """Whether (n,) the tool is on and over the surface at each waypoint of a process segment;
+        nowhere on free moves."""
+        return self.applies if self.on_surface is None else self.applies & self.on_surface
 
     @property
     def speeds_m_s(self) -> np.ndarray:
@@ -131,7 +144,8 @@ class ToolPath:
 
 
 def split_at_edges(segment: Segment) -> list[Segment]:
-    """A process segment as those on the surface and those off it, without force, in turn.
+    """A process segment as those on the surface and those off it, without force, in turn; where its
+    tool is off, as approach and retract.
 
     A segment off the surface ends at the waypoint at which the tool is back on it; the next one
     begins there. One that is on the surface all along stays as it is.
@@ -139,23 +153,31 @@ def split_at_edges(segment: Segment) -> list[Segment]:
     there = segment.over_surface
     if segment.kind != "process" or there.all():
         return [segment]
-    cuts = np.flatnonzero(np.diff(there.astype(int))) + 1
+    state = segment.applies.astype(int) + there
+    cuts = np.flatnonzero(np.diff(state)) + 1
     starts, stops = [0, *cuts], [*cuts, len(there)]
     parts = []
     for start, stop in zip(starts, stops, strict=True):
         over = bool(there[start])
         last = stop == len(there)
-        chosen = slice(start, stop if over or last else stop + 1)
+        chosen = slice(start, stop if last or state[stop] < state[start] else stop + 1)
         feeds = segment.feeds_m_s
+        kind: SegmentKind = "process"
+        if not state[start]:
+            kind = "approach" if not start else "retract"
         parts.append(
             replace(
                 segment,
+                kind=kind,
                 positions=segment.positions[chosen],
                 quaternions_xyzw=segment.quaternions_xyzw[chosen],
                 feeds_m_s=None if feeds is None else feeds[chosen],
                 force_n=segment.force_n if over else None,
                 dwell_s=segment.dwell_s if last else 0.0,
-                on_surface=None if over else np.zeros(len(segment.positions[chosen]), bool),
+                on_surface=None
+                if over or kind != "process"
+                else np.zeros(len(segment.positions[chosen]), bool),
+                tool_on=None,
             )
         )
     return parts

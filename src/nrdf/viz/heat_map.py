@@ -8,7 +8,7 @@ import numpy as np
 
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.frames import unit_vectors
-from nrdf.geometry.mesh import Mesh, triangle_crosses
+from nrdf.geometry.mesh import Mesh, triangle_areas, triangle_crosses
 from nrdf.viz.mesh_render import MeshScene, Triangles
 from nrdf.viz.palette import NO_REGION
 from nrdf.viz.view import Camera
@@ -36,6 +36,16 @@ def levels_of(values_m: np.ndarray, target_m: float, tolerance_m: float) -> np.n
     return np.searchsorted(LEVELS[1:-1], (np.asarray(values_m) - target_m) / tolerance_m)
 
 
+def level_areas(
+    region: Triangles, values_m: np.ndarray, target_m: float, tolerance_m: float
+) -> tuple[float, ...]:
+    """The share of a region's area in each of the colours' ranges, by its faces' values (f,)."""
+    level = levels_of(values_m, target_m, tolerance_m)
+    areas = triangle_areas(np.asarray(region.vertices), np.asarray(region.faces))
+    shares = np.bincount(level, areas, len(COLOURS)) / areas.sum()
+    return tuple(shares.tolist())
+
+
 def heat_map(
     whole: Triangles,
     region: Triangles,
@@ -53,8 +63,7 @@ def heat_map(
     turn = np.eye(3) if turn is None else turn
     level = levels_of(values_m, target_m, tolerance_m)
     crosses = triangle_crosses(np.asarray(region.vertices), np.asarray(region.faces))
-    areas = np.linalg.norm(crosses, axis=1)
-    shares = np.bincount(level, areas, len(COLOURS)) / areas.sum()
+    shares = level_areas(region, values_m, target_m, tolerance_m)
     centre, scale = canonical_transform(np.asarray(whole.vertices) @ turn)
 
     def moved(mesh: Triangles, faces: np.ndarray) -> Mesh:
@@ -74,7 +83,7 @@ def heat_map(
     table = np.array([*(_rgb(colour) for colour in COLOURS), NO_REGION])
     corner = 0.5 * (low + high - wide)
     image = scene.render(axes, corner, pixels, shape, table, table[:-1])
-    return HeatMap(np.asarray(image[::-1]), tuple(shares.tolist()))
+    return HeatMap(np.asarray(image[::-1]), shares)
 
 
 def _rgb(colour: str) -> list[float]:

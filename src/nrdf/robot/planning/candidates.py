@@ -15,6 +15,7 @@ from nrdf.robot.planning.reachability import SEEDS, IKSolutions, solve_everywher
 from nrdf.toolpath.types import SegmentGroup
 
 _KEPT, _KEPT_PER_INDEX = 6, 2
+_OVERLAP = 12  # waypoints that are covered already, over which a gun runs up to its speed
 
 
 @dataclass
@@ -144,20 +145,21 @@ def _track(
     rows: np.ndarray | None = None,
 ) -> None:
     """Extend candidates (`rows` of them, or all) from `start` forwards (1) or backwards (-1), until
-    they fail, or come to the segment's end or to what is covered."""
+    they fail, or come to the segment's end or to what is covered: a gun's a little over it."""
     active = np.arange(len(start)) if rows is None else rows
     at = start.copy()
+    left = np.array([_OVERLAP if groups[i].process.runs_up else 0 for i in candidates.group])
     joints = candidates.joints[active, at]
     before = joints.copy()
     while len(active):
         at = at + direction
-        inside = np.array(
-            [
-                0 <= k < len(covered[i]) and not covered[i][k]
-                for i, k in zip(candidates.group[active], at, strict=True)
-            ],
-            bool,
+        pairs = list(zip(candidates.group[active], at, strict=True))
+        there = np.array([0 <= k < len(covered[i]) for i, k in pairs], bool)
+        taken = np.array(
+            [ok and covered[i][k] for ok, (i, k) in zip(there, pairs, strict=True)], bool
         )
+        inside = there & (~taken | (left[active] > 0))
+        left[active[taken]] -= 1
         active, at, joints, before = (x[inside] for x in (active, at, joints, before))
         if not len(active):
             break

@@ -9,9 +9,11 @@ again with the tool axis tilted a little.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from nrdf.geometry.polylines import step_lengths
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.approach_retract import add_approach_retract
 from nrdf.robot.planning.candidates import CandidatePaths, track_beyond, track_from
@@ -24,6 +26,7 @@ _ANCHORS_APART = 60
 _ROUNDS, _TILTED_ROUNDS = 5, 2
 _TURN = 6  # waypoints that a turn of the object must add, or save in lifts
 _SHORTEST = 3  # waypoints of a joint path that is worth a lift, unless nothing longer is found
+_RUN_UP_S = 0.2  # at a line's feed, by which joint paths of a gun overlap with it off
 
 
 def plan_joint_paths(
@@ -114,6 +117,7 @@ def _cover(
     """
     paths: list[JointPath] = []
     dropped = np.zeros(len(candidates.group), bool)
+    at_rest: set[int] = set()  # rows whose gun goes on at rest, as the arm has no way into them
     while True:
         runs = {
             int(i): [
@@ -126,15 +130,43 @@ def _cover(
         chosen = _on_few_turns(candidates, runs, covered, least, opened)
         if not chosen:
             return paths
-        for (row, first, last), path in zip(
-            chosen, _complete(cell, groups, candidates, chosen), strict=True
+        longer = [
+            part if part[0] in at_rest else _with_run_up(groups, candidates, *part)
+            for part in chosen
+        ]
+        for (row, first, last), long, path in zip(
+            chosen, longer, _complete(cell, groups, candidates, longer), strict=True
         ):
             if path is not None:
+                if long != (row, first, last):
+                    path = replace(path, works=(first, last))
                 paths.append(path)
                 covered[path.group][first : last + 1] = True
                 opened.add(path.turntable_index)
+            elif long != (row, first, last):
+                at_rest.add(row)
             elif not candidates.blocked[row, first:last].any():
                 dropped[row] = True
+
+
+def _with_run_up(
+    groups: Sequence[SegmentGroup], candidates: CandidatePaths, row: int, first: int, last: int
+) -> tuple[int, int, int]:
+    """A part (row, first, last) of a candidate, longer by what a gun needs to reach its speed, as
+    far as the arm gets; the same where something is pressed on the surface."""
+    process = groups[int(candidates.group[row])].process
+    if not process.runs_up:
+        return row, first, last
+    good, blocked = candidates.good[row], candidates.blocked[row]
+    steps, speeds = step_lengths(process.positions), process.speeds_m_s
+    ends = []
+    for k, step, stop in ((first, -1, 0), (last, 1, len(speeds) - 1)):
+        left = _RUN_UP_S * float(speeds[min(k + 1, len(speeds) - 1)])
+        while k != stop and left > 0.0 and good[k + step] and not blocked[min(k, k + step)]:
+            left -= float(steps[min(k, k + step)])
+            k += step
+        ends.append(k)
+    return row, ends[0], ends[1]
 
 
 def _on_few_turns(

@@ -15,12 +15,14 @@ from nrdf.robot.planning.inverse_kinematics import SeedLibrary
 from nrdf.robot.planning.joint_path import JointPath
 from nrdf.robot.planning.motion_planner import Roadmap
 from nrdf.robot.planning.timing import FREE_SHARE, STEP_S, TimedTrajectory, time_parameterize
-from nrdf.toolpath.types import SegmentGroup
+from nrdf.toolpath.types import Segment, SegmentGroup
 
 FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
 TURNTABLE_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
+LEAST_FORCE_SHARE = 0.1
+"""Share of its force with which a pad that stands still rests on the surface."""
 _MAX_SHIFTED = 3
 _FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
@@ -37,7 +39,9 @@ class Action:
     while the turntable turns. timed: joints at each step, the arm at rest at both ends. group,
     first: of a joint path, which segment group it is of and the waypoint that it begins at; -1 and
     0 elsewhere. angles_rad: (t,) of the turntable at each step where it turns, none elsewhere.
-    off_surface: (t,) bool, where a process leads beyond the object's edge; None: nowhere.
+    off_surface: (t,) bool, where a process leads beyond the object's edge; tool_off: (t,) bool,
+    where its gun is off; None: nowhere. force_share: (t,) of the force, where it follows the speed;
+    None: all of it.
     """
 
     kind: ActionKind
@@ -49,6 +53,8 @@ class Action:
     dwell_s: float = 0.0
     angles_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
     off_surface: np.ndarray | None = None
+    tool_off: np.ndarray | None = None
+    force_share: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -258,6 +264,19 @@ def _turntable_move(cell: Cell, before: int, after: int, home: np.ndarray) -> Ac
     return Action("turntable", after, timed, angles_rad=angles)
 
 
+def _force_share(
+    cell: Cell, process: Segment, joints: np.ndarray, at: np.ndarray
+) -> np.ndarray | None:
+    """The share (t,) of its force with which a pad presses, where feeds were planned by the result:
+    that of its feed which it has, so that it takes off as much everywhere. At waypoints `at` (t,).
+    """
+    if process.force_n is None or process.feeds_m_s is None or len(joints) < 2:
+        return None
+    speeds = np.linalg.norm(np.gradient(cell.chain.frames(joints).tcp, STEP_S, axis=0), axis=1)
+    number = np.arange(len(process.positions))
+    return np.clip(speeds / np.interp(at + 0.5, number, process.speeds_m_s), LEAST_FORCE_SHARE, 1.0)
+
+
 def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Action]:
     """Approach, process and retract of a joint path."""
     process = group.process
@@ -284,13 +303,23 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
         made = Action(kind, path.turntable_index, timed, group=path.group, first=path.first)
         if kind != "process":
             return made
-        off = None
-        if process.on_surface is not None:
-            at, last = path.first + timed.waypoint, len(process.on_surface) - 1
-            before, after = np.floor(at + 1e-6).astype(int), np.ceil(at - 1e-6).astype(int)
-            there = process.on_surface
-            off = ~(there[np.clip(before, 0, last)] & there[np.clip(after, 0, last)])
-        return replace(made, force_n=process.force_n, dwell_s=process.dwell_s, off_surface=off)
+        at, last = path.first + timed.waypoint, len(process.positions) - 1
+        before = np.clip(np.floor(at + 1e-6).astype(int), 0, last)
+        after = np.clip(np.ceil(at - 1e-6).astype(int), 0, last)
+        beyond, tool_off = (
+            None if there is None else ~(there[before] & there[after])
+            for there in (process.on_surface, process.tool_on)
+        )
+        if path.works is not None and tool_off is not None:
+            tool_off |= (at < path.works[0] - 1e-6) | (at > path.works[1] + 1e-6)
+        return replace(
+            made,
+            force_n=process.force_n,
+            dwell_s=process.dwell_s,
+            off_surface=beyond,
+            tool_off=tool_off,
+            force_share=_force_share(cell, process, timed.joints, at),
+        )
 
     return [
         action("approach", into, np.arange(float(len(into))), approach.feed_m_s),

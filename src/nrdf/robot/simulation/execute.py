@@ -45,7 +45,8 @@ class ExecutionLog:
     """What happened during one action, a row for each step.
 
     joints: (t, n). waypoint: (t,), a number between the joint path's waypoints. working: (t,),
-    false while the tool waits for its force, dwells, or is beyond an edge. force_n: (t,) that the
+    false while the tool waits for its force, dwells, presses less as it is slow, or is beyond an
+    edge. force_n: (t,) that the
     sensor measures. tip, axis: (t, 3) of the tool in the object's planned frame. off_m: (t,) of the
     tip from where it is commanded to be, without the correction along the axis.
     """
@@ -197,15 +198,16 @@ def _press(
     """A joint path under force; its log, and how far along its axis the tool was off at the end."""
     motion = _Motion.of(cell, action)
     count = len(motion.joints)
-    wanted = float(action.force_n or 0.0)
-    stiffness = max(wanted, 1.0) / PAD_GIVE_M
+    most = float(action.force_n or 0.0)
+    share = np.ones(count) if action.force_share is None else action.force_share
+    stiffness = max(most, 1.0) / PAD_GIVE_M
     gap = _gaps(motion, cell, action, surface, shift_m)
     expected = _expected(_gaps(motion, cell, action, planned, 0.0 * shift_m))
     rising = np.gradient(expected, STEP_S) if count > 1 else 0.0 * expected
     travel = np.gradient(motion.positions, axis=0) if count > 1 else np.zeros((1, 3))
     travel /= np.maximum(np.linalg.norm(travel, axis=1, keepdims=True), 1e-9)
     gain = STEP_S / (_RESPONSE_S * stiffness)
-    most = _FASTEST_M_S * STEP_S
+    fastest = _FASTEST_M_S * STEP_S
     settling, dwelling = round(SETTLING_S / STEP_S), round(action.dwell_s / STEP_S)
     record = _Record(arm, count + settling + dwelling)
     # The correction is what the scan predicts, and what the force asks for beyond it.
@@ -216,7 +218,7 @@ def _press(
     tip, axis = arm.tip()
     still = np.zeros(motion.joints.shape[1])
     while True:
-        inward = motion.axes[i]
+        inward, wanted = motion.axes[i], float(share[i] * most)
         away = tip - motion.positions[i]
         depth = float(away @ inward)
         # The spring between the surface and where the pad's face really is.
@@ -239,16 +241,16 @@ def _press(
         tip, axis = arm.tip()
         force = arm.force(axis)
         if not off[i]:
-            correction += min(max(gain * (wanted - force), -most), most)
+            correction += min(max(gain * (wanted - force), -fastest), fastest)
         correction = min(max(correction, -_FARTHEST_M - expected[i]), _FARTHEST_M - expected[i])
         aside = away - depth * inward
         record.add(
             arm, tip, axis, force, float(np.sqrt(aside @ aside)), action.timed.waypoint[i],
-            moving and not off[i],
+            moving and not off[i] and share[i] == 1.0,
         )  # fmt: skip
         if not working:
             waited += 1
-            steady = steady + 1 if abs(force - wanted) < SETTLED_SHARE * wanted else 0
+            steady = steady + 1 if abs(force - wanted) < SETTLED_SHARE * most else 0
             working = steady >= 10 or waited >= settling
         elif i < count - 1:
             i += 1

@@ -71,7 +71,7 @@ def executed_motion(
     cell: Cell, logs: Sequence[ExecutionLog], shift_m: np.ndarray
 ) -> ExecutedMotion:
     """The tool's motion along its lines, in the object's own frame, waits and dwells included: a
-    gun is on and a pad turns all that time."""
+    gun is on and a pad turns all that time, but where the gun is off in run-ups."""
     parts = [_part(cell, log) for log in logs if log.action.kind == "process" and len(log.tip)]
     if not parts:
         none, empty = np.zeros((0, 3)), np.zeros(0)
@@ -98,4 +98,9 @@ def _part(cell: Cell, log: ExecutionLog) -> tuple[np.ndarray, ...]:
     along = cell.chain.frames(log.joints[middle]).tool[:, :, 0] @ pose[:3, :3]
     axes = log.axis[middle]
     along = unit_vectors(along - np.einsum("ka,ka->k", along, axes)[:, None] * axes)
-    return log.tip[middle], axes, along, count * STEP_S, speeds, force
+    off = log.action.tool_off
+    on = count
+    if off is not None:  # where the arm dwells, its gun is as at the line's end
+        rows = off[np.minimum(np.arange(len(log.tip)), len(off) - 1)]
+        on = count - np.add.reduceat(rows.astype(int), first)
+    return log.tip[middle], axes, along, on * STEP_S, speeds, force

@@ -120,6 +120,14 @@ class ResultCache:
                 "surface", loaded.file, progress=_within(progress, done, len(waiting))
             )
 
+    def with_a_target(self) -> list[str]:
+        """The targets on which a process has a film or depth that is wanted."""
+        return [
+            key
+            for key, found in self.by_target.items()
+            if any(path.result is not None for path in found.transfer_result.paths)
+        ]
+
     # --- plans on the reference
 
     def plan(self, region: PaintedRegion, number: int) -> Plan | None:

@@ -15,7 +15,8 @@ from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs
 from nrdf.studio.panels.reference import AS_IN_FILE, unit_of
 from nrdf.studio.panels.standing import StandingFolder
-from nrdf.studio.scene.colours import COLOURINGS
+from nrdf.studio.scene.colours import COLOURINGS, RESULT
+from nrdf.studio.scene.result_map import result_legend
 
 ALL = "all of them"
 STANDS = ("in any pose", "+X forward, +Y up")
@@ -42,8 +43,10 @@ class TargetsTab:
         self.colours = gui.add_dropdown(
             "Colours", COLOURINGS,
             hint="regions: paler where the confidence is lower. confidence: green 1, red 0. "
-            "similarity: of the descriptors to the picked point.",
+            "similarity: of the descriptors to the picked point. film or depth: what the processes "
+            "will leave; blue too little, red too much.",
         )  # fmt: skip
+        self.legend = gui.add_html("", visible=False)
         self.width = gui.add_slider(
             "Similarity width", 0.02, 0.6, 0.01, 0.15,
             hint="Descriptor distance to the picked point at which the colour fades.",
@@ -66,6 +69,12 @@ class TargetsTab:
         inputs.set_value(self.shown, shown if shown in keys else ALL)
         inputs.set_value(self.colours, context.colouring)
         self.standing.refresh()
+        visible = context.visible_objects() if context.colouring == RESULT else []
+        found = [(key, context.results.by_target.get(key)) for key in visible]
+        self.legend.content = "".join(
+            result_legend(key, one.transfer_result.paths) for key, one in found if one is not None
+        )
+        self.legend.visible = bool(self.legend.content)
         self.status.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."
 
     def _about(self, key: str) -> str:
@@ -120,6 +129,7 @@ class TargetsTab:
 
     def _recolour(self) -> None:
         self.context.recolour(self.colours.value, float(self.width.value))
+        self.refresh()
 
     def _more(self, which: str) -> None:
         context, key = self.context, self.context.shown_target

@@ -9,8 +9,9 @@ import numpy as np
 from nrdf.studio.model.document import PaintedRegion
 from nrdf.viz.palette import NO_REGION, SEVERAL_REGIONS, confidence_scale, similarity_scale
 
-COLOURINGS = ("regions", "confidence", "similarity")
-"""What the colours of points can show."""
+RESULT = "film or depth"
+COLOURINGS = ("regions", "confidence", "similarity", RESULT)
+"""What colours can show."""
 BARE = np.array(NO_REGION) * 255
 
 

@@ -19,7 +19,7 @@ from nrdf.toolpath.modifiers.one_way import one_way, start_at
 from nrdf.toolpath.modifiers.order import order_nearest, order_shortest
 from nrdf.toolpath.modifiers.resample import resample
 from nrdf.toolpath.modifiers.run_off import run_off
-from nrdf.toolpath.modifiers.smooth_orientation import smooth_orientation
+from nrdf.toolpath.modifiers.smooth_orientation import smooth_orientation, steady_normals
 from nrdf.toolpath.modifiers.split import split
 from nrdf.toolpath.surface_path import SurfacePath
 from nrdf.toolpath.types import Segment
@@ -27,6 +27,7 @@ from nrdf.toolpath.types import Segment
 PATH_MODIFIERS: dict[str, Callable[..., list[SurfacePath]]] = {
     "split": split,
     "smooth-orientation": smooth_orientation,
+    "steady-normals": steady_normals,
     "minimum-length": minimum_length,
     "resample": resample,
     "chord-error": chord_error,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nrdf.geometry.frames import angles_between, unit_vectors
-from nrdf.geometry.polylines import step_lengths
+from nrdf.geometry.polylines import arc_length, step_lengths
 from nrdf.toolpath.modifiers.split import LEAST_STEP_M, cut, turns
 from nrdf.toolpath.strategy import LARGEST_TURN_RAD_M
 from nrdf.toolpath.surface_path import SurfacePath
@@ -46,6 +46,25 @@ def smooth_orientation(
         sharpest = np.arange(len(found)) == np.argmax(found / allowed)
         waiting += cut(path, sharpest)[::-1]
     return smooth
+
+
+def steady_normals(paths: Sequence[SurfacePath], reach_m: float) -> list[SurfacePath]:
+    """Paths whose normals are averaged that far to either side along them, the near ones most.
+
+    Towards an end as far as to the end alone, so that the ends keep their own. Closed paths stay as
+    they are; a reach of 0 changes nothing.
+    """
+    return [path if path.closed else _steady(path, reach_m) for path in paths]
+
+
+def _steady(path: SurfacePath, reach_m: float) -> SurfacePath:
+    if reach_m <= 0.0 or len(path.contacts) < 3:
+        return path
+    along = arc_length(path.contacts)
+    reach = np.minimum(np.minimum(along, along[-1] - along) + 1e-9, reach_m)
+    away = np.abs(along[None] - along[:, None]) / reach[:, None]
+    weights = np.maximum(1.0 - away, 0.0)
+    return replace(path, normals=unit_vectors(weights @ path.normals))
 
 
 def turned_steadily(normals: np.ndarray, allowed: np.ndarray) -> np.ndarray:
