@@ -54,7 +54,7 @@ class FeedWeights:
 
     spill: float = 0.05
     change: float = 0.02
-    apart: float = 0.2
+    apart: float = 0.05
 
 
 def plan_feeds(

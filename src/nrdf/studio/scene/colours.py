@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nrdf.studio.model.document import PaintedRegion
+from nrdf.viz.heat_map import COLOURS
 from nrdf.viz.palette import NO_REGION, SEVERAL_REGIONS, confidence_scale, similarity_scale
 
 RESULT = "film or depth"
@@ -56,6 +57,9 @@ def legend_of(colouring: str, regions: Sequence[PaintedRegion]) -> list[tuple[st
         several = [("in several regions", hexadecimal(np.array(SEVERAL_REGIONS)))]
         own = [(region.name, hexadecimal(np.array(region.colour))) for region in regions]
         return own + (several if len(regions) > 1 else [])
+    if colouring == RESULT:
+        ends = ("far too little", COLOURS[0]), ("far too much", COLOURS[-1])
+        return [ends[0], ("wanted", COLOURS[len(COLOURS) // 2]), ends[1]]
     scale = confidence_scale if colouring == "confidence" else similarity_scale
     words = {1.0: f"{colouring} 1", 0.5: "0.5", 0.0: "0"}
     return [(w, hexadecimal(scale(np.array([v]))[0])) for v, w in words.items()]
