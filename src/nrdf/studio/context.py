@@ -30,7 +30,7 @@ from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.teaching import ORIGIN
 from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
-from nrdf.studio.scene.colours import BARE, COLOURINGS, RESULT, similarity_colours
+from nrdf.studio.scene.colours import COLOURINGS, RESULT, similarity_colours
 from nrdf.studio.scene.drawing import (
     colours_of,
     direction_of,
@@ -40,7 +40,7 @@ from nrdf.studio.scene.drawing import (
     title_of,
 )
 from nrdf.studio.scene.object_view import ObjectView
-from nrdf.studio.scene.result_map import result_meshes
+from nrdf.studio.scene.result_map import draw_result
 from nrdf.studio.scene.scene_view import SceneView
 
 if TYPE_CHECKING:
@@ -149,10 +149,7 @@ class StudioContext(ABC):
         made = self.results.surface(key)
         object_view.draw_surface(made if result is None else result.transfer_result.surface)
         if self.colouring == RESULT and result is not None:
-            object_view.draw_regions(result_meshes(result.transfer_result.paths))
-            count = len(object_view.paintable.points)
-            object_view.set_colours(np.tile(BARE.astype(np.uint8), (count, 1)))
-            return
+            return draw_result(object_view, result.transfer_result.paths)
         object_view.draw_regions(meshes)
         if by_similarity:
             colours = similarity_colours(self._distances[key], self.similarity_width)
@@ -168,11 +165,6 @@ class StudioContext(ABC):
         with self.lock:
             if colouring == "similarity" and not self._distances:
                 raise NrdfError("take 'Similarity' and click a point of the reference first")
-            if colouring == RESULT and not self.results.with_a_target():
-                raise NrdfError(
-                    "no process on a target says what it should leave: give one thickness_um or "
-                    "removal_um in its knowledge file, and transfer it"
-                )
             self.colouring, self.similarity_width = colouring, width
             self.draw()
 

@@ -128,6 +128,11 @@ class TargetsTab:
         self.context.show_target(None if shown == ALL else shown)
 
     def _recolour(self) -> None:
+        if self.colours.value == RESULT and not self.context.results.with_a_target():
+            raise NrdfError(
+                "no process on a target says what it should leave: give one thickness_um or "
+                "removal_um in its knowledge file, and transfer it"
+            )
         self.context.recolour(self.colours.value, float(self.width.value))
         self.refresh()
 

@@ -11,9 +11,18 @@ from nrdf.geometry.mesh import Mesh
 from nrdf.process.result_target import result_settings
 from nrdf.process.transfer_result import PathResult
 from nrdf.reports.result_report import histogram
+from nrdf.studio.scene.colours import BARE
+from nrdf.studio.scene.object_view import ObjectView
 from nrdf.viz.heat_map import COLOURS, level_areas, levels_of
 
 _WIDEST_PX = 120
+
+
+def draw_result(object_view: ObjectView, steps: Sequence[PathResult]) -> None:
+    """Draw what paths leave on an object, whose other surface is then bare."""
+    object_view.draw_regions(result_meshes(steps))
+    count = len(object_view.paintable.points)
+    object_view.set_colours(np.tile(BARE.astype(np.uint8), (count, 1)))
 
 
 def result_meshes(steps: Sequence[PathResult]) -> dict[str, tuple[Mesh, np.ndarray]]:
