@@ -27,11 +27,11 @@ class Lift:
 
     def cost(self, stops: np.ndarray, starts: np.ndarray) -> np.ndarray:
         """Of ways from ends (..., 2, 3) to ends (..., 2, 3), m; each a place and its normal."""
-        far = np.linalg.norm(stops[..., 0, :] - starts[..., 0, :], axis=-1)
+        far = _length(stops[..., 0, :] - starts[..., 0, :])
         alike = np.einsum("...a,...a->...", stops[..., 1, :], starts[..., 1, :])
         driven = (far <= self.gap_m) & (alike > np.cos(self.turn_rad))
         above = [end[..., 0, :] + self.height_m * end[..., 1, :] for end in (stops, starts)]
-        lifted = np.linalg.norm(above[0] - above[1], axis=-1) + 2.0 * self.height_m
+        lifted = _length(above[0] - above[1]) + 2.0 * self.height_m
         return np.asarray(np.where(driven, far, lifted))
 
 
@@ -111,3 +111,7 @@ def _best_turn(starts: np.ndarray, stops: np.ndarray, lift: Lift) -> tuple[int, 
     gain[np.tril_indices(count - 1, -1)] = -np.inf
     i, j = np.unravel_index(int(np.argmax(gain)), gain.shape)
     return int(i) + 1, int(j) + 1, float(gain[i, j])
+
+
+def _length(ways: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("...a,...a->...", ways, ways))

@@ -73,15 +73,23 @@ def _long_chains(graph: ReebGraph, least_m2: float) -> tuple[list[np.ndarray], n
     """Nodes of each long chain, in order, and the cluster (n,) that other nodes are of; -1 on
     chains. Short dead ends are left out first, so that they don't cut a chain."""
     alive = np.ones(len(graph.centre), bool)
+    known: dict[bytes, bool] = {}  # most chains stay as they are when a dead end goes
+
+    def is_long(chain: np.ndarray) -> bool:
+        key = chain.tobytes()
+        if key not in known:
+            known[key] = _is_long(graph, chain, least_m2)
+        return known[key]
+
     while True:
         chains = _chains(graph, alive)
         degree = _degrees(graph, alive)
-        short = [c for c in chains if not _is_long(graph, c, least_m2)]
+        short = [c for c in chains if not is_long(c)]
         dead = [c for c in short if min(degree[c[0]], degree[c[-1]]) <= 1 and len(chains) > 1]
         if not dead:
             break
         alive[min(dead, key=len)] = False
-    long = [chain for chain in chains if _is_long(graph, chain, least_m2)]
+    long = [chain for chain in chains if is_long(chain)]
     rest = np.ones(len(alive), bool)
     for chain in long:
         rest[chain] = False
