@@ -22,7 +22,7 @@ from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import up_axis, upright
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.aligned_scan import align
-from nrdf.scans.kind_check import FITS, MINIMUM_PROBABILITY, check_by_network
+from nrdf.scans.kind_check import CONFIRMED, FITS, MINIMUM_PROBABILITY, check_by_network
 
 
 def said(answer: int, rotation=None) -> str:
@@ -52,6 +52,19 @@ def test_it_says_what_it_sees_and_what_to_do():
     assert "look at the picture, or scan more sides" in said(quarter, turned)
     fits = check_by_network(Saying(0), "chair", np.zeros((5, 3)), np.eye(3))
     assert fits.fits and fits.taken_for == FITS and fits.describe()["probability"] == 0.9
+
+
+def test_a_confirmed_pose_is_not_warned_of_but_another_kind_is():
+    quarter = orientation_of(rotation_about_up(np.pi / 2))
+    for answer in (quarter, TILTED, ASKEW + 1):
+        seen = check_by_network(Saying(answer), "chair", np.zeros((5, 3)), np.eye(3))
+        assert not seen.fits and seen.of_confirmed_pose.fits
+        assert seen.of_confirmed_pose.taken_for == CONFIRMED
+    other = check_by_network(Saying(OTHER), "chair", np.zeros((5, 3)), np.eye(3))
+    (warning,) = other.of_confirmed_pose.warnings
+    assert "may be no chair" in warning and "--up" not in warning
+    fits = check_by_network(Saying(0), "chair", np.zeros((5, 3)), np.eye(3))
+    assert fits.of_confirmed_pose is fits
 
 
 @pytest.mark.parametrize("category", ["chair", "car", "plane"])

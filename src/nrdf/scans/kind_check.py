@@ -7,7 +7,7 @@ how well known objects explain the target (`nrdf.scans.pose_scorer`), which says
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,9 @@ MINIMUM_PROBABILITY = 0.3
 """Probability that an object stands upright and faces forward, below which there is a warning."""
 _COUNTED = 2048  # points in which objects are counted
 FITS = "upright and facing forward"
+CONFIRMED = "in the pose that a person confirmed"
 _SOMETHING_ELSE = "something else"
+_OBJECTS = " objects"
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,17 @@ class KindCheck:
     def fits(self) -> bool:
         """Whether nothing speaks against the target."""
         return not self.warnings
+
+    @property
+    def of_confirmed_pose(self) -> KindCheck:
+        """What is left of it once a person has confirmed the pose: whether it is of another kind,
+        or several objects."""
+        if self.fits or self.taken_for.endswith(_OBJECTS):
+            return self
+        if self.taken_for == _SOMETHING_ELSE:
+            other = f"the target may be no {self.category}, or a part of one; check that it is one"
+            return replace(self, warnings=(other,))
+        return replace(self, taken_for=CONFIRMED, warnings=())
 
     def describe(self) -> dict[str, Any]:
         """What a report says of it."""
@@ -103,7 +116,7 @@ def check_points(
         f"the target holds {count} objects of comparable size; give a cloud of one {category}, or "
         f"--up {_letter(rotation[:, 1])} to have the largest taken"
     )
-    return KindCheck(category, f"{count} objects", 0.0, (warning,))
+    return KindCheck(category, f"{count}{_OBJECTS}", 0.0, (warning,))
 
 
 def check_by_network(

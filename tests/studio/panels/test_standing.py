@@ -10,6 +10,9 @@ import pytest
 from builders.lying_scan import ANY, lying_scan
 from nrdf.bundled import bundled_chair
 from nrdf.io.cloud import write_cloud
+from nrdf.process.limits import strict_warnings
+from nrdf.regions.reference import EncodedReference
+from nrdf.scans.kind_check import KindCheck
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.session_file import read_document
 from nrdf.studio.panels.panel import next_step
@@ -82,10 +85,13 @@ def test_cleaning_is_taken_back_and_made_again(scanned):
     assert "there is no object 3" in scanned.does(folder._take, "3 of 3")
 
 
-def test_tool_paths_are_in_the_frame_of_the_scan(scanned):
+def test_tool_paths_are_in_the_frame_of_the_scan(scanned, monkeypatch):
+    turned = KindCheck("chair", "facing -Z", 0.0, ("it does not look upright",))
+    monkeypatch.setattr(EncodedReference, "check_kind", lambda *_: turned)
     scanned.does(scanned.studio.panel.targets.standing._confirm)
     assert scanned.transfer() == ""
     result = scanned.studio.results.by_target["scan"].transfer_result
+    assert result.kind.fits and not strict_warnings(result), "a person has confirmed the pose"
     there = result.target.points[result.regions["seat"].match.indices]
     chair, regions = bundled_chair("ladder-back")
     seat = chair.points[regions["seat"]].mean(axis=0) - [0.0, chair.points[:2500, 1].min(), 0.0]

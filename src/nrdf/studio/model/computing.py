@@ -173,11 +173,12 @@ class LocalComputing:
         progress(0, 1)
         target_cloud = self._encode(target)
         placement = self._poses.get(target)
-        doubts = () if placement is None or placement.confirmed else placement.warnings
+        doubts, kind = None if placement is None else placement.warnings, None
+        if placement is not None and placement.confirmed:
+            doubts, kind = (), self._prepared.reference.check_kind(target_cloud).of_confirmed_pose
         return self._prepared.transfer(
-            target_cloud, marked=dict(marked), progress=progress,
-            target_warnings=doubts if placement is not None else None,
-        )  # fmt: skip
+            target_cloud, marked=dict(marked), progress=progress, target_warnings=doubts, kind=kind
+        )
 
     def correspondence_features(
         self, reference: str, files: Mapping[str, str], progress: Progress
