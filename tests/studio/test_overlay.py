@@ -17,7 +17,7 @@ def asks(page, monkeypatch):
     """Asks as the page of browser 7 does."""
     answers = page.server.page.answers
     client = SimpleNamespace(
-        client_id=7, camera=SimpleNamespace(aspect=1.3), atomic=nullcontext,
+        client_id=7, camera=SimpleNamespace(image_width=780, image_height=600), atomic=nullcontext,
         add_notification=lambda *words, **more: None,
     )  # fmt: skip
     monkeypatch.setattr(page.server, "get_clients", lambda: {7: client})
@@ -43,10 +43,25 @@ def test_tools_are_taken_and_shown(page, asks):
 
 
 def test_who_may_only_look_changes_nothing(page, asks):
-    asks("read_only")
+    page.studio.pen.opened(7)
+    asks("only_look")
     asks("tool", name="Brush")
     done(page)
     assert page.studio.mouse.tool == "Orbit"
+
+
+def test_of_two_pages_one_works_until_the_other_takes_the_pen(page, asks):
+    page.studio.pen.opened(3)
+    page.studio.pen.opened(7)
+    asks("tool", name="Brush")
+    done(page)
+    assert page.studio.mouse.tool == "Orbit" and page.studio.panel.overlay.content()["pen"] == 3
+    asks("take_pen")
+    done(page)
+    assert state(page)["pen"] == 7 and not page.server.may_change(3)
+    asks("tool", name="Brush")
+    done(page)
+    assert page.studio.mouse.tool == "Brush"
 
 
 def test_what_is_no_outline_is_refused(page, asks):

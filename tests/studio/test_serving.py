@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 pytest.importorskip("viser", reason="pip install 'nrdf[studio]'")
 
 import viser
-from viser._messages import FileTransferPart, FileTransferStartUpload
+from viser._messages import FileTransferPart, FileTransferStartUpload, GuiUpdateMessage
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -41,6 +42,17 @@ def test_pages_of_elsewhere_may_not_connect(server):
         with pytest.raises(InvalidStatus, match="403"):
             connect(f"ws://127.0.0.1:{port}", origin=origin, subprotocols=[version])
         assert get(port, f"127.0.0.1:{port}", f"Origin: {origin}").startswith("HTTP/1.1 403 ")
+
+
+def test_of_a_page_that_looks_on_nothing_is_taken(server):
+    field = server.gui.add_number("Feed", 5.0)
+    sent = GuiUpdateMessage(field._impl.uuid, {"value": 7.0})
+    server.may_change = lambda page: page == 1
+    take = server._websock_server._handle_incoming_message
+    asyncio.run(take(2, sent))
+    assert field.value == 5.0
+    asyncio.run(take(1, sent))
+    assert field.value == 7.0
 
 
 def test_no_other_page_shows_it_within_itself(server):

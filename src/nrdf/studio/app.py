@@ -22,7 +22,9 @@ from nrdf.studio.panels.panel import Panel
 if TYPE_CHECKING:
     pass
 
-_ASPECT = 1.2  # width over height of a page that is not open yet
+_SIZE = 720, 600  # of a page that is not open yet
+_TOOLS, _ROW = 1250, 30  # length of the tools, and height of each of their rows, in pixels
+_STRIP, _LINE = 132, 40  # pixels that they cover at the right and the bottom
 _PATCH = 0.08  # first radius of a patch, in longest sides of the object
 
 
@@ -134,14 +136,26 @@ class Studio(StudioContext):
         self.scene.arrange(visible)
         self.arm_simulation.follow_object()
         arm_points = self.arm_simulation.occupied_points
-        position, look_at = self.scene.camera(visible, _ASPECT, arm_points)
+        free = self._free_part(*_SIZE)
+        position, look_at = self.scene.camera(visible, _SIZE[0] / _SIZE[1], arm_points, free)
         initial = self.server.initial_camera
         initial.position, initial.look_at = tuple(position), tuple(look_at)
         for client in self.server.get_clients().values():
-            position, look_at = self.scene.camera(visible, client.camera.aspect, arm_points)
+            size = client.camera.image_width, client.camera.image_height
+            free = self._free_part(*size)
+            position, look_at = self.scene.camera(visible, size[0] / size[1], arm_points, free)
             with client.atomic():
                 client.camera.position = position
                 client.camera.look_at = look_at
+
+    def _free_part(self, width: int, height: int) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom, in shares, of what tools, small pictures and time line
+        leave of a window of that size in pixels."""
+        strip = _STRIP if len(self.editor.document.targets) > 1 else 0
+        line = _LINE if self.arm_simulation.shown else 0
+        tools = 8 + _ROW * -(-_TOOLS // width)
+        right, bottom = 1 - min(strip / width, 0.3), 1 - min(line / height, 0.1)
+        return 0.0, min(tools / height, 0.3), right, bottom
 
     def refresh_panel(self) -> None:
         """Show in the panel what the document, the plans and the results say."""

@@ -30,6 +30,7 @@ from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.teaching import ORIGIN
 from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
+from nrdf.studio.pen import Pen
 from nrdf.studio.scene.colours import COLOURINGS, RESULT, similarity_colours
 from nrdf.studio.scene.drawing import (
     colours_of,
@@ -80,8 +81,7 @@ class StudioContext(ABC):
         self.lock = threading.RLock()
         self.region, self.step, self.radius_m = "", 0, 0.05
         self.colouring, self.similarity_width = COLOURINGS[0], 0.15
-        self.read_only: set[int] = set()
-        """The ids of browsers that may only look, as phones."""
+        self.pen = Pen()
         self.shown_target: str | None = None
         """The one target that is shown beside the reference, None for all."""
         self._distances: dict[str, np.ndarray] = {}

@@ -49,11 +49,13 @@ class Overlay:
         self._simulation, self.thumbnails = simulation, Thumbnails(self._drawn)
         self._state = context.server.gui.add_html("")
         context.server.on_client_connect(self._welcome)
-        context.server.on_client_disconnect(lambda c: context.read_only.discard(c.client_id))
+        context.server.on_client_disconnect(self._left)
         if isinstance(context.server, StudioServer):
+            context.server.may_change = context.pen.may_change
             context.server.page.answers |= {
                 "tool": self._act, "act": self._act, "hover": self._hover, "lasso": self._lasso,
-                "read_only": self._look_only, "target": self._show_target, "seek": self._seek,
+                "only_look": self._look_only, "take_pen": self._take_pen,
+                "target": self._show_target, "seek": self._seek,
                 "thumbnail": lambda values: self.thumbnails.png(values["name"]),
             }  # fmt: skip
 
@@ -67,6 +69,7 @@ class Overlay:
         """What is shown, as `page/overlay.js` takes it."""
         context = self.context
         return {
+            "pen": context.pen.holder,
             "tool": self.mouse.tool,
             "tools": [[each.name, each.key, _plain(each.hint)] for each in TOOLS],
             "erase": self.mouse.erase,
@@ -85,6 +88,7 @@ class Overlay:
         if len(keys) < 2:
             return []
         found = context.results.by_target
+        colours = {region.name: region.colour for region in context.editor.document.regions}
 
         def doubt(key: str) -> tuple[int, float]:
             if key not in found:
@@ -95,7 +99,7 @@ class Overlay:
 
         return [
             (key, title_of(context.editor, context.results, key),
-             self.thumbnails.stamp(key, found.get(key)), key == context.shown_target)
+             self.thumbnails.stamp(key, found.get(key), colours), key == context.shown_target)
             for key in sorted(keys, key=doubt)
         ]  # fmt: skip
 
@@ -124,6 +128,12 @@ class Overlay:
 
     def _welcome(self, client: viser.ClientHandle) -> None:
         client.gui.add_html(_CLIENT.format(client.client_id))
+        self.context.pen.opened(client.client_id)
+        self._drawn()
+
+    def _left(self, client: viser.ClientHandle) -> None:
+        self.context.pen.closed(client.client_id)
+        self._drawn()
 
     def _act(self, values: Mapping[str, str]) -> dict[str, object]:
         name = values["name"]
@@ -150,7 +160,17 @@ class Overlay:
             self.context.lock.release()
 
     def _look_only(self, values: Mapping[str, str]) -> dict[str, object]:
-        self.context.read_only.add(self._client(values).client_id)
+        self.context.pen.only_look(self._client(values).client_id)
+        return {}
+
+    def _take_pen(self, values: Mapping[str, str]) -> dict[str, object]:
+        page = self._client(values).client_id
+
+        def take() -> None:
+            self.context.pen.take(page)
+            self.refresh()
+
+        self._inputs.soon(take)  # after what the other page did
         return {}
 
     def _show_target(self, values: Mapping[str, str]) -> dict[str, object]:
@@ -175,7 +195,7 @@ class Overlay:
         self, values: Mapping[str, str], act: Callable[[viser.ClientHandle], None]
     ) -> dict[str, object]:
         client = self._client(values)
-        if client.client_id not in self.context.read_only:
+        if self.context.pen.may_change(client.client_id):
             self._inputs.soon(lambda: act(client))
         return {}
 

@@ -12,8 +12,13 @@ from unittest.mock import patch
 
 import viser
 import websockets.asyncio.server
-from viser._messages import FileTransferPart, FileTransferStartUpload
-from viser.infra import ClientId
+from viser._messages import (
+    FileTransferPart,
+    FileTransferStartUpload,
+    GetRenderResponseMessage,
+    ViewerCameraMessage,
+)
+from viser.infra import ClientId, Message
 from websockets.asyncio.server import Request, Response, ServerConnection
 
 from nrdf.errors import OutputError
@@ -23,6 +28,7 @@ from nrdf.studio.page_requests import PageRequests
 
 _WRONG_HOST = "the studio answers to the address that it has printed; --allow-host adds a name\n"
 _WRONG_ORIGIN = "the studio answers to its own pages alone\n"
+_OF_LOOKING = (ViewerCameraMessage, GetRenderResponseMessage)
 _CLOSED = {
     "Content-Security-Policy": "frame-ancestors 'none'",
     "X-Frame-Options": "DENY",
@@ -32,9 +38,11 @@ _CLOSED = {
 
 
 class StudioServer(viser.ViserServer):
-    """page: what the page asks for beside viser's own."""
+    """page: what the page asks for beside viser's own. may_change: whether a browser, by its id, is
+    listened to; of others only the camera is."""
 
     page: PageRequests
+    may_change: Callable[[int], bool]
 
 
 def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> StudioServer:
@@ -56,7 +64,8 @@ def open_server(host: str, port: int, more_hosts: Iterable[str] = ()) -> StudioS
         contextlib.redirect_stdout(io.StringIO()),
     ):
         server = StudioServer(host, port, label="nrdf studio", verbose=False)
-    server.page = page
+    server.page, server.may_change = page, lambda _: True
+    _hold_back(server)
     # Every page could ask for a public address that leads here.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
     _limit_uploads(server)
@@ -85,6 +94,18 @@ def _serve_own(
         return serve(*args, process_request=answer, **options)
 
     return serve_own
+
+
+def _hold_back(server: StudioServer) -> None:
+    """Let browsers that only look on do nothing: neither inputs, nor clicks, drags and files."""
+    inner = server._websock_server
+    handle = inner._handle_incoming_message
+
+    async def hold_back(client_id: ClientId, message: Message) -> None:
+        if isinstance(message, _OF_LOOKING) or server.may_change(client_id):
+            await handle(client_id, message)
+
+    inner._handle_incoming_message = hold_back  # type: ignore[method-assign]
 
 
 def _limit_uploads(server: viser.ViserServer) -> None:

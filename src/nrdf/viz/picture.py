@@ -115,14 +115,15 @@ def draw_regions(
 
 
 def render_panels(
-    panels: Sequence[Panel], size: int
+    panels: Sequence[Panel], size: int, own: Mapping[str, np.ndarray] | None = None
 ) -> tuple[list[list[np.ndarray]], dict[str, np.ndarray]]:
     """The pictures that `draw_regions` puts together, and each region's colour.
 
     One row a view, in it an array (h, size, 3) in [0, 1] for each panel, all of the same scale.
+    own: colours (3,) in [0, 1] of regions instead of the usual ones.
     """
     names = list(dict.fromkeys(name for panel in panels for name in panel.names))
-    colours = region_colours(names)
+    colours = {**region_colours(names), **{n: c for n, c in (own or {}).items() if n in names}}
     drawn = [p.scene if p.names == names else _prepare(p, names) for p in panels]
     hidden = _hidden_regions(drawn, len(names))
     cameras = [FRONT, _best_side(drawn, hidden)] if hidden else [FRONT]

@@ -37,16 +37,6 @@ def test_a_value_that_a_person_has_just_set_is_not_overwritten(page):
     assert handle.value == "from the program"
 
 
-def test_who_may_only_look_sets_nothing(page):
-    inputs, done = Inputs(page.studio), []
-    page.studio.read_only.add(BROWSER.client_id)
-    send = events(inputs, done.append)
-    asyncio.run(send(SimpleNamespace(client=BROWSER, target=SimpleNamespace(value=1))))
-    inputs.soon(lambda: done.append("soon"))
-    inputs._executor.shutdown()
-    assert done == ["soon"]
-
-
 def test_values_of_the_program_are_no_events_and_errors_are_shown(page):
     inputs = Inputs(page.studio)
 

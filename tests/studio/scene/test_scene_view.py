@@ -32,8 +32,8 @@ def test_the_camera_sees_every_corner(row):
 
     shown = list(row.objects)
     row.arrange(shown)
-    for aspect in (0.6, 2.0):
-        position, look_at = row.camera(shown, aspect)
+    for aspect, free in ((0.6, (0, 0, 1, 1)), (2.0, (0, 0, 1, 1)), (1.4, (0.1, 0.2, 0.8, 0.95))):
+        position, look_at = row.camera(shown, aspect, free=free)
         forward = (look_at - position) / np.linalg.norm(look_at - position)
         right = np.cross(forward, [0.0, 1.0, 0.0])
         right /= np.linalg.norm(right)
@@ -41,7 +41,9 @@ def test_the_camera_sees_every_corner(row):
         camera = Camera(position, rotation, FOV_RAD, aspect)
         corners = np.concatenate([view.corners for view in row.objects.values()])
         places, depths = camera.project(corners)
-        assert (depths > 0).all() and (places > 0).all() and (places < 1).all()
+        assert (depths > 0).all()
+        assert (places > free[:2]).all() and (places < free[2:]).all()
+        assert (np.ptp(places, axis=0) / np.subtract(free[2:], free[:2])).max() > 0.85, "large"
 
 
 def test_a_ray_meets_the_nearest_visible_object(row):

@@ -24,6 +24,7 @@
   const lasso = make("div", { id: "nrdf-lasso", hidden: true });
   root.append(make("h1", {}, ["nrdf studio"]), lasso, tools, legend, strip, line, tip);
 
+  const looking = () => narrow() || (state.pen != null && String(state.pen) !== client());
   const canvas = () => document.querySelector("canvas");
   let state = {}, shown = "";
 
@@ -41,18 +42,21 @@
     shown = held;
     state = JSON.parse(held);
     document.body.dataset.tool = state.tool;
-    if (narrow() && client() && !root.dataset.looks) {
-      root.dataset.looks = "only";
-      own("read_only");
+    if (narrow() && client() && !root.dataset.phone) {
+      root.dataset.phone = "is";
+      own("only_look");
     }
-    tools.replaceChildren(
+    root.dataset.looks = looking() ? "only" : "";
+    const another = [make("span", { className: "words" }, ["Another page changes this session."]),
+      button("Work here", "", "Then the other page looks on", null, () => own("take_pen"))];
+    tools.replaceChildren(...(looking() ? another : [
       ...state.tools.map(([name, key, hint]) =>
         button(name, key, hint, name === state.tool, () => own("tool", { name }))),
       button("Erase", state.erase_key, "Paint takes away instead", state.erase,
         () => own("act", { name: "Erase" })),
       make("span", { className: "gap" }),
       ...state.acts.map(([name, key, hint]) =>
-        button(name, key, hint, null, () => own("act", { name }))));
+        button(name, key, hint, null, () => own("act", { name })))]));
     legend.replaceChildren(...state.legend.map(([words, colour]) => {
       const chip = make("i");
       chip.style.background = colour;
@@ -77,7 +81,7 @@
       return part;
     }));
     line.hidden = !state.line.length;
-    lasso.hidden = state.tool !== "Lasso" || narrow();
+    lasso.hidden = state.tool !== "Lasso" || looking();
   }
 
   function place() {
@@ -161,6 +165,16 @@
     own("lasso", { points });
   };
   lasso.onwheel = (event) => canvas().dispatchEvent(new WheelEvent("wheel", event));
+
+  // Who looks on changes nothing, not even on their own page.
+  for (const kind of ["pointerdown", "mousedown", "click", "keydown"])
+    addEventListener(kind, (event) => {
+      const free = root.contains(event.target) || canvas()?.parentElement.contains(event.target) ||
+        event.target.closest?.("[role=tab], [aria-label='Fold panel'], .mantine-Notification-root");
+      if (!looking() || free || event.key === "Tab") return;
+      event.stopPropagation();
+      if (kind !== "pointerdown") event.preventDefault();
+    }, true);
 
   addEventListener("DOMContentLoaded", () => {
     document.body.append(root);

@@ -39,7 +39,7 @@ class Inputs:
 
         # Async: on the event loop, at once, before anything can set the input to another value.
         async def answer(event: Any) -> None:
-            if event.client is None or event.client.client_id in self.context.read_only:
+            if event.client is None:
                 return
             panel_event = PanelEvent(event.client, getattr(event.target, "value", None))
             self._pending[id(event.target)] += 1

@@ -17,6 +17,7 @@ _FRONT = np.array([0.86, 0.52, 0.34])
 _RIGHT = np.array([0.42, 0.36, 0.83])
 """The same where an arm stands in front of the object."""
 _MARGIN = 1.06  # of the camera's distance, in distances at which everything is just seen
+_WHOLE = (0.0, 0.0, 1.0, 1.0)
 _GAP = 0.25  # between objects, in sides of the largest
 
 
@@ -70,11 +71,13 @@ class SceneView:
             right -= high[2] - low[2] + gap
 
     def camera(
-        self, shown: Sequence[str], aspect: float, arm_points: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, shown: Sequence[str], aspect: float, arm_points: np.ndarray | None = None,
+        free: tuple[float, float, float, float] = _WHOLE,
+    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
         """Position (3,) and target (3,) of a camera that sees the objects `shown` from the front.
 
         aspect: width over height. With points (k, 3) of an arm it sees them, too, from the right.
+        free: left, top, right and bottom of the part of the window that nothing covers, in shares.
         """
         object_views = [object_view for key, object_view in self.objects.items() if key in shown]
         more = np.zeros((0, 3)) if arm_points is None else arm_points
@@ -87,8 +90,17 @@ class SceneView:
         axes = np.stack([right, np.cross(toward, right), toward])
         seen = (corners - middle) @ axes.T
         half = np.tan(FOV_RAD / 2) * np.array([aspect, 1.0])
-        away = float((np.abs(seen[:, :2]) / half + seen[:, 2:]).max())
-        return middle + _MARGIN * away * toward, middle
+        left, top, right_end, bottom = free
+        low = half * [2 * left - 1, 1 - 2 * bottom]
+        high = half * [2 * right_end - 1, 1 - 2 * top]
+        # A camera `away` from the middle and `aside` of it sees a point within low and high where
+        # aside >= across + depth * high - away * high, and <= the same with low.
+        least = (seen[:, :2] + seen[:, 2:] * high).max(axis=0)
+        most = (seen[:, :2] + seen[:, 2:] * low).min(axis=0)
+        away = _MARGIN * float(((least - most) / (high - low)).max())
+        aside = ((least - away * high) + (most - away * low)) / 2
+        look_at = middle + aside @ axes[:2]
+        return look_at + away * toward, look_at
 
     def hit(self, origin: np.ndarray, direction: np.ndarray) -> tuple[ObjectView, int] | None:
         """The object and its shown point that a ray meets first."""
