@@ -25,6 +25,9 @@ def test_the_pad_is_on_the_object_in_the_scene_too(playback, scene_view, plate_c
 
     for at in np.flatnonzero(playback.motion == "process")[20::40]:
         arm_view.show(int(at))
+        active = arm_view._active_line.points / scale
+        pad_at = playback.lines[0][int(playback.line[at])][0]
+        assert abs(active.reshape(-1, 3).mean(axis=0) - pad_at.mean(axis=0)).max() < 0.02
         scene = placed(
             "/arm", placed(f"/arm/body{pad.body}", pad.vertices * scene_view.units_per_m)
         )
@@ -37,6 +40,9 @@ def test_the_pad_is_on_the_object_in_the_scene_too(playback, scene_view, plate_c
             turned.apply(plate.points[met[1]] * scene_view.units_per_m) + object_view.frame.position
         )
         assert scene[:, 1].min() == pytest.approx(point[1], abs=0.006 * scale)
+    between = int(np.flatnonzero(playback.line < 0)[0])
+    arm_view.show(between)
+    assert arm_view._active_line is None, "between lines none is worked on"
     seen = arm_view.occupied_points
     assert len(seen) and seen[:, 1].min() < 0.0, "the column's foot is below the raised object"
     arm_view.remove()

@@ -78,5 +78,5 @@ def test_lines_lie_close_above_a_mesh(scene_view):
     view = scene_view.add("box", PaintableCloud(with_mesh()))
     top = view.paintable.high[1]
     line = np.array([[0.0, top, 0.0], [0.05, top, 0.0]])
-    lift = view._lifted(line) - line
+    lift = view.lifted(line) - line
     assert 0.0 < np.linalg.norm(lift, axis=1).max() < 0.003 * view.paintable.longest_side

@@ -20,6 +20,7 @@ from nrdf.robot.simulation.scene import cell_specification
 
 if TYPE_CHECKING:
     from nrdf.robot.simulation.simulate import SimulatedPath, SimulationResult
+    from nrdf.toolpath.types import Segment
 
 FLOOR = -1  # the body of what does not move
 EVERY_PATH = -1
@@ -51,7 +52,8 @@ class Playback:
     `nrdf.robot.planning.program.ActionKind`; line (t,), -1 between lines; force_n (t,);
     turntable_rad (t,); positions (t, b, 3) and quaternions_wxyz (t, b, 4) of the bodies.
     T_cell_object: (4, 4), of the object at turntable angle 0. unreached: (k, 3), waypoints that are
-    not reached, in the object's frame, m. report: the content of report.json.
+    not reached, in the object's frame, m; lines: of each tool path its lines by number, as places
+    (k, 3) on the surface each, in the same frame. report: the content of report.json.
     """
 
     shapes: tuple[Shape, ...]
@@ -65,6 +67,7 @@ class Playback:
     quaternions_wxyz: np.ndarray
     T_cell_object: np.ndarray
     unreached: np.ndarray
+    lines: tuple[dict[int, list[np.ndarray]], ...]
     report: dict[str, Any]
 
     @property
@@ -114,6 +117,7 @@ def playback_of(simulated: SimulationResult) -> Playback:
         **{name: np.concatenate(values) for name, values in parts.items()},
         T_cell_object=_upright(simulated),
         unreached=np.concatenate([_unreached(path) for path in simulated.paths]),
+        lines=tuple(_lines(path) for path in simulated.paths),
         report=simulation_report(simulated),
     )
 
@@ -221,12 +225,22 @@ def _upright(simulated: SimulationResult) -> np.ndarray:
 
 def _unreached(path: SimulatedPath) -> np.ndarray:
     """Waypoints (k, 3) that are not reached, on the surface."""
-    height = path.strategy.standoff_m
     positions = [
-        (group.process.positions + height * group.process.axes)[verdict != "reached"]
+        _on_surface(path, group.process)[verdict != "reached"]
         for group, verdict in zip(path.path.groups, path.metrics.verdicts, strict=True)
     ]
     return np.concatenate([np.zeros((0, 3)), *positions])
+
+
+def _lines(path: SimulatedPath) -> dict[int, list[np.ndarray]]:
+    lines: dict[int, list[np.ndarray]] = defaultdict(list)
+    for group in path.path.groups:
+        lines[group.process.line].append(_on_surface(path, group.process))
+    return dict(lines)
+
+
+def _on_surface(path: SimulatedPath, segment: Segment) -> np.ndarray:
+    return np.asarray(segment.positions + path.strategy.standoff_m * segment.axes)
 
 
 def _rgb(colour: np.ndarray) -> tuple[int, int, int]:

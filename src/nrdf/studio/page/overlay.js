@@ -24,7 +24,8 @@
   const lasso = make("div", { id: "nrdf-lasso", hidden: true });
   root.append(make("h1", {}, ["nrdf studio"]), lasso, tools, legend, strip, line, tip);
 
-  const looking = () => narrow() || (state.pen != null && String(state.pen) !== client());
+  const looking = () =>
+    narrow() || (client() && state.pen != null && String(state.pen) !== client());
   const canvas = () => document.querySelector("canvas");
   let state = {}, shown = "";
 
@@ -38,8 +39,8 @@
 
   function show() {
     const held = document.querySelector("[data-nrdf-state]")?.dataset.nrdfState;
-    if (!held || held === shown) return;
-    shown = held;
+    if (!held || client() + held === shown) return;
+    shown = client() + held;
     state = JSON.parse(held);
     document.body.dataset.tool = state.tool;
     if (narrow() && client() && !root.dataset.phone) {

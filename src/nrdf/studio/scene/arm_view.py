@@ -13,6 +13,9 @@ from nrdf.studio.scene.object_view import ObjectView
 _CELL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From the cell's frame, z up, to the scene's, y up; the object's x stays x."""
 _UNREACHED = (215, 20, 20)
+_ACTIVE = np.array([214, 0, 170], np.uint8)
+"""Colour of the line that is worked on."""
+_ACTIVE_LIFT = 1.5  # of that line above the object, in lifts of the others
 _UNREACHED_SIZE = 1.2  # of a point that is not reached, in spacings
 _THICKNESS_M = (-0.08, 0.08)  # around the arm's frames, which have no thickness
 _EVERY = 25  # every 25th moment is enough to place the camera
@@ -51,6 +54,8 @@ class ArmView:
             precision="float32",
         )
         self._index = -1
+        self._active: tuple[int, int] | None = None
+        self._active_line: viser.SceneNodeHandle | None = None
         self.place(object_view.offset)
 
     @property
@@ -86,11 +91,30 @@ class ArmView:
         for path, tools in self._tools.items():
             for mesh in tools:
                 mesh.visible = path == playback.path[index]
+        self._highlight(int(playback.path[index]), int(playback.line[index]))
         self._index = index
+
+    def _highlight(self, path: int, line: int) -> None:
+        """Draw the line that is worked on thick; none between lines."""
+        if self._active == (path, line):
+            return
+        if self._active_line is not None:
+            self._active_line.remove()
+        self._active, self._active_line = (path, line), None
+        parts = [part for part in self.playback.lines[path].get(line, []) if len(part) > 1]
+        if parts:
+            drawn = [self.object_view.lifted(part, _ACTIVE_LIFT) for part in parts]
+            pairs = [np.stack([part[:-1], part[1:]], axis=1) for part in drawn]
+            self._active_line = self._scene.add_line_segments(
+                f"{self.object_view.path}/active", np.concatenate(pairs) * self._factor, _ACTIVE,
+                thickness=5.0, thickness_units="screen",
+            )  # fmt: skip
 
     def set_visible(self, visible: bool) -> None:
         """Show or hide all but the object."""
         self._root.visible = self._marks.visible = visible
+        if self._active_line is not None:
+            self._active_line.visible = visible
 
     def remove(self) -> None:
         """Remove the arm, and place the object as it is without one."""
@@ -98,6 +122,8 @@ class ArmView:
         if not self.object_view.removed:  # else all that is drawn of it is gone already
             self.object_view.place(self._origin + self._object)
             self._marks.remove()
+            if self._active_line is not None:
+                self._active_line.remove()
 
     def _body(self, number: int) -> str:
         name = f"/arm/body{number}"

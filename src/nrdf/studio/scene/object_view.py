@@ -231,7 +231,7 @@ class ObjectView:
             handle.remove()
         self._lines.clear()
         for number, (parts, colour) in enumerate(lines.values()):
-            drawn = [self._lifted(part) for part in parts if len(part) > 1]
+            drawn = [self.lifted(part) for part in parts if len(part) > 1]
             if not drawn:
                 continue
             pairs = [np.stack([part[:-1], part[1:]], axis=1) for part in drawn]
@@ -284,9 +284,10 @@ class ObjectView:
         self.removed = True
         self.frame.remove()
 
-    def _lifted(self, line: np.ndarray) -> np.ndarray:
+    def lifted(self, line: np.ndarray, times: float = 1.0) -> np.ndarray:
+        """A line (m, 3), m, on the surface as it is drawn above it, or some `times` as high."""
         surface = self.paintable.surface
         lift = _LIFT * surface.spacing
         if self._mesh is not None:
             lift = _ON_MESH * self.paintable.longest_side
-        return line + lift * surface.normals[surface.tree.query(line)[1]]
+        return line + times * lift * surface.normals[surface.tree.query(line)[1]]
