@@ -40,7 +40,7 @@ FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshade
          "--enable-unsafe-swiftshader")  # fmt: skip
 SIZE = (1280, 720)
 MOST_CLICKS, MOST_WAIT_S, MOST_S = 25, 90.0, 600.0
-SEAT, BACK = (0.53, 0.57), (0.44, 0.35)  # places of the bundled chair in the first view
+SEAT, BACK = (0.53, 0.61), (0.45, 0.41)  # places of the bundled chair in the first view
 TABS = ("1 Reference", "2 Regions", "3 Process", "4 Targets", "5 Save", "6 Robot")
 # Few frames a second: drawing without a graphics card takes what the server needs.
 SELDOM = """const draw = window.requestAnimationFrame;
