@@ -29,12 +29,14 @@ from nrdf.toolpath.region_samples import border_distance, sample_evenly
 from nrdf.toolpath.strategy import Strategy
 from nrdf_benchmark.mesh_paths.found_surface import regions_on
 from nrdf_benchmark.mesh_paths.targets import TargetSource
+from nrdf_benchmark.process_execution import Execution, execute_on_arm
 
 TARGET = Target(60e-6, 6e-6)
 STANDOFF_M, FEED_M_S = 0.15, 0.25
 ROLES = ("seat", "back", "top", "bonnet", "roof", "all")
 """Names of the regions that are painted; "all" is a mesh that is one region."""
 _UP, _FORWARD = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+_SHEETS_UP = np.array([0.0, 0.0, 1.0])  # of meshes that are one region
 _FACING = 0.5  # least cosine to the side that is painted
 _CURVED_RAD = np.radians(5.0)  # standard deviation of the normals' angle from their mean
 
@@ -42,7 +44,8 @@ _CURVED_RAD = np.radians(5.0)  # standard deviation of the normals' angle from t
 @dataclass(frozen=True)
 class RegionResult:
     """One region. faces: of it as given; cells: that its film is computed on; curved: whether it
-    bends. seconds: CPU time of all but the taught lines. error: why there is none."""
+    bends. seconds: CPU time of all but the taught lines. error: why there is none. executed: what
+    the arm left of the plan, where that was asked for; arm_error: why it left nothing."""
 
     target: str
     region: str
@@ -53,6 +56,8 @@ class RegionResult:
     taught: ResultMetrics | None
     seconds: float
     error: str = ""
+    executed: Execution | None = None
+    arm_error: str = ""
 
 
 @dataclass(frozen=True)
@@ -103,12 +108,14 @@ def evaluate_plate(radius_m: float = 0.05) -> PlateResult:
 def evaluate_regions(
     sources: Sequence[TargetSource],
     whole: bool = False,
+    arm: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[RegionResult]:
     """Every region of every mesh that the footprint fits into.
 
     whole: all of a labelled part, its edges and its far side too, instead of the side that is
-    painted: the upper one of seats, tops, bonnets and roofs, the front of backs.
+    painted: the upper one of seats, tops, bonnets and roofs, the front of backs. arm: whether the
+    simulated arm executes each plan too.
     """
     results = []
     for number, source in enumerate(sources):
@@ -120,14 +127,16 @@ def evaluate_regions(
             radius = target.strategy.tool_radius_m
             for side in _sides(find(name), name, whole):
                 if fits(side, radius):
-                    results.append(evaluate_region(side, target.name, name, target.strategy))
+                    results.append(evaluate_region(side, target.name, name, target.strategy, arm))
         if progress is not None:
             progress(number + 1, len(sources))
     return results
 
 
-def evaluate_region(region: RegionMesh, target: str, name: str, strategy: Strategy) -> RegionResult:
-    """One region, planned in both ways."""
+def evaluate_region(
+    region: RegionMesh, target: str, name: str, strategy: Strategy, arm: bool = False
+) -> RegionResult:
+    """One region, planned in both ways, and executed where an arm is asked for."""
     profile, limits = gun(strategy.tool_radius_m), FeedLimits()
     faces, curved = len(region.mesh.faces), is_curved(region)
     taught = taught_strategy(strategy, profile)
@@ -139,7 +148,17 @@ def evaluate_region(region: RegionMesh, target: str, name: str, strategy: Strate
     except NrdfError as error:
         return RegionResult(target, name, faces, 0, curved, None, None, 0.0, str(error))
     cells = len(made.model.cells.areas_m2)
-    return RegionResult(target, name, faces, cells, curved, made.metrics, made.taught, seconds)
+    result = RegionResult(target, name, faces, cells, curved, made.metrics, made.taught, seconds)
+    if not arm:
+        return result
+    up = _SHEETS_UP if name == "all" else _UP
+    try:
+        done = execute_on_arm(
+            region, made, profile, TARGET, up, _FORWARD, strategy.tool_radius_m
+        )  # fmt: skip
+    except NrdfError as error:
+        return replace(result, arm_error=str(error))
+    return replace(result, executed=done)
 
 
 def _sides(region: RegionMesh, name: str, whole: bool) -> Iterator[RegionMesh]:
@@ -184,11 +203,13 @@ def summary(results: Sequence[RegionResult]) -> list[tuple[str, ...]]:
     before = np.array([100 * t.within for _, t in pairs])
     even = np.array([p.variation / t.variation for p, t in bent])
     spill = np.array([p.overspray / t.overspray for p, t in pairs])
+    arm = np.array([100 * r.executed.metrics.within for r in results if r.executed])
     rows = [
         _row("area within ± 10 %, %", ">= 95", within, within >= 95.0, within.min, before),
         _row("variation, of the taught plan's, curved", "<= 0.5", even, even <= 0.5, even.max),
         _row("overspray, of the taught plan's", "<= 0.8", spill, spill <= 0.8, spill.max),
         _row("seconds for 10,000 cells", "<= 3", quick, quick <= 3.0, quick.max),
+        _row("area executed within ± 10 %, %", ">= 95", arm, arm >= 95.0, arm.min),
     ]  # fmt: skip
     return [row for row in rows if row]
 

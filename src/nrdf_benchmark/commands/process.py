@@ -15,6 +15,7 @@ def process(
     sample: Count | None = None,
     whole: bool = False,
     each: bool = False,
+    arm: bool = False,
 ) -> None:
     """Film thickness planned by the result, beside the taught plan at one feed.
 
@@ -29,6 +30,7 @@ def process(
         sample: Only so many meshes of each folder, evenly chosen.
         whole: All of each labelled part, its edges and far side too.
         each: A row for each region as well.
+        arm: The simulated arm executes each plan, and what it leaves is measured too.
     """
     from nrdf_benchmark.mesh_paths.targets import target_sources
     from nrdf_benchmark.process_results import evaluate_plate, evaluate_regions, summary
@@ -41,7 +43,7 @@ def process(
     )
     sources = target_sources(meshes, sample)
     with progress_bar("regions") as progress:
-        results = evaluate_regions(sources, whole, progress)
+        results = evaluate_regions(sources, whole, arm, progress)
     if each:
         rows = table("\neach region", "", "", "cells", "within", "taught", "variation", "taught",
                      "overspray", "taught", "s", texts=2)  # fmt: skip
@@ -53,6 +55,19 @@ def process(
             cells = [f"{value:.1%}" for pair in pairs for value in pair]
             rows.add_row(r.target, r.region, str(r.cells), *cells, f"{r.seconds:.1f}")
         show(rows)
+    if arm:
+        rows = table("\nexecuted by the simulated arm", "", "", "within", "less", "more",
+                     "variation", "overspray", "reached", "s", "s planned", texts=2)  # fmt: skip
+        for r in results:
+            if r.executed is None or r.planned is None:
+                continue
+            left = r.executed.metrics
+            shares = (left.within, left.below, left.above, left.variation, left.overspray,
+                      r.executed.reached)  # fmt: skip
+            cells = [f"{value:.1%}" for value in shares]
+            rows.add_row(r.target, r.region, *cells, f"{left.seconds:.0f}",
+                         f"{r.planned.seconds:.0f}")  # fmt: skip
+        show(rows)
     what = "whole parts" if whole else "one side of each part"
     shown = table(f"\n{what}, {len(results)} regions", "", "bar", "met by", "median", "worst",
                   "taught, median")  # fmt: skip
@@ -62,3 +77,5 @@ def process(
     for r in results:
         if r.error:
             console.print(f"{r.target}, {r.region}: no path: {r.error}")
+        if r.arm_error:
+            console.print(f"{r.target}, {r.region}: not executed: {r.arm_error}")
