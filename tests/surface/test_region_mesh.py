@@ -127,3 +127,14 @@ def test_regions_that_overlap_share_nothing_and_say_so():
     meshes = region_meshes(sheet, points, normals, shares, {"wide": 0.02, "right": 0.02}).found
     assert meshes["wide"].area_m2 + meshes["right"].area_m2 <= 1.0 + 1e-9
     assert "1 overlap given to another region" in " ".join(meshes["wide"].changes)
+
+
+def test_a_region_of_another_mesh_of_the_object_is_put_onto_the_one_given():
+    parent = plate()
+    low = TargetMesh(parent.vertices - [0.0, 0.0, 0.002], parent.faces)
+    centres, up = low.vertices[low.faces].mean(axis=1), low.face_normals
+    own = RegionMesh(low, low).on_parent(centres, up)
+    assert np.array_equal(own[0], centres) and own[2] < 1e-6
+    places, normals, same = RegionMesh(low, parent).on_parent(centres, up)
+    assert np.abs(places[:, 2]).max() < 1e-9 and np.allclose(normals, up)
+    assert 0.002 < same < 0.01

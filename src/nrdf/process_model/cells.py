@@ -10,11 +10,7 @@ from nrdf.surface.fine_mesh import FineMesh, refine
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 
-_SAME = 1e-6  # of the object's size: how near a face's centre lies to the region that it is of
 _PARALLEL = 0.9  # cosine
-_OFF, _TIMES = 0.99, 2.0
-"""Share of a region's cells, and times their largest distance from its object, within which other
-faces are its own: where it was cut from another mesh of the object."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +36,7 @@ class Cells:
         the parent: behind it they would be in its shadow.
         """
         own = refine(region.mesh.vertices, region.mesh.faces, edge_m)
-        centres, normals = own.centres, own.normals
-        same = _SAME * region.parent.size
-        there = region.parent.nearest(centres, normals)
-        off = float(np.quantile(there.distances, _OFF))
-        if off > same:
-            same = _TIMES * off
-            near = (there.distances < same)[:, None]
-            centres = np.where(near, there.points, centres)
-            normals = np.where(near, there.normals, normals)
+        centres, normals, same = region.on_parent(own.centres, own.normals)
         parts = [(centres, normals, own.areas, True)]
         beside = _beside(region, edge_m, around_m, same)
         if beside is not None:

@@ -18,6 +18,10 @@ from nrdf.surface.smooth_normals import SmoothNormals
 from nrdf.surface.target_mesh import TargetMesh
 
 _WORTH = 0.1  # footprints, an area that is worth a word
+_SAME = 1e-6  # of the object's size: how near to the object's mesh a region's places are on it
+_OFF, _TIMES = 0.99, 2.0
+"""Share of a region's places, and times their largest distance from its object, within which they
+are the object's own: where it was cut from another mesh of the object."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,25 @@ class RegionMesh:
     def memo(self) -> dict[Hashable, Any]:
         """What was worked out of the region before, by all that it depends on."""
         return {}
+
+    def on_parent(
+        self, points: np.ndarray, normals: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Places (m, 3), m, and normals (m, 3) on the parent, of points (m, 3) of the region and
+        their normals, and within which distance, m, a place of the one is one of the other.
+
+        A region that was found on a scan lies a little above or below the mesh that was given:
+        below it everything would be in the way.
+        """
+        same = _SAME * self.parent.size
+        there = self.parent.nearest(points, normals)
+        off = float(np.quantile(there.distances, _OFF)) if len(points) else 0.0
+        if off <= same:
+            return points, normals, same
+        same = _TIMES * off
+        near = (there.distances < same)[:, None]
+        places = np.where(near, there.points, points)
+        return places, np.where(near, there.normals, normals), same
 
     @property
     def area_m2(self) -> float:

@@ -18,7 +18,6 @@ from nrdf.toolpath.strategy import Strategy
 
 _PER_RADIUS = 4.0  # samples along the tool's radius
 _FEWEST, _MOST = 400, 20_000
-_SAME = 1e-5  # of an object's size: points that near to its mesh are on it
 _FINE = 3.0  # edges along the margin
 
 NO_CLEARANCE, MARGIN = "no_clearance", "edge_margin"
@@ -74,7 +73,8 @@ class RegionSamples:
         points, faces = sample_evenly(region.mesh, strategy.tool_radius_m / _PER_RADIUS)
         normals = region.mesh.face_normals[faces]
         needed = needed_clearance(strategy.clearance_m, strategy.tool_radius_m)
-        free = has_clearance(region.parent, _on(region.parent, points, normals), normals, needed)
+        places, _, _ = region.on_parent(points, normals)
+        free = has_clearance(region.parent, places, normals, needed)
         inside: np.ndarray = np.ones(len(points), bool)
         margin = strategy.edge_margin_m
         if margin > 0.0:
@@ -97,20 +97,6 @@ class RegionSamples:
         left_out = {NO_CLEARANCE: float((~free).mean()), MARGIN: float(margin.mean())}
         missed = missed & self.inside_margin
         return Coverage(float(worked.mean()), left_out, float(missed.mean()))
-
-
-def _on(mesh: TargetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Points (m, 3), m, of a region, on a mesh of the object; with normals (m, 3) that tell sides.
-
-    A region that was found on a scan lies a little above or below the mesh that was given, and
-    below it everything would be in the way.
-    """
-    off = mesh.nearest(points).distances > _SAME * mesh.size
-    if not off.any():
-        return points
-    places = points.copy()
-    places[off] = mesh.nearest(points[off], normals[off]).points
-    return places
 
 
 def sample_evenly(mesh: TargetMesh, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
