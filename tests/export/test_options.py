@@ -10,6 +10,8 @@ from builders.read_programs import (
 from nrdf.errors import ProcessError
 from nrdf.export.options import Options
 from nrdf.export.registry import export_job
+from nrdf.process.result_keys import FeedLimitKeys
+from nrdf.process_model.feed_planner import FeedLimits
 
 
 @pytest.mark.parametrize(
@@ -56,3 +58,8 @@ def test_process_only_leaves_approach_and_retract_out(tmp_path):
         "zero_ftsensor()"
         not in (tmp_path / "urscript/nrdf_chair.script").read_text().split("def p1")[1]
     )
+
+
+def test_programs_accelerate_as_feeds_are_planned():
+    planned = {FeedLimits().acceleration_m_s2, FeedLimitKeys().acceleration_m_s2}
+    assert planned == {Options().acceleration_m_s2}

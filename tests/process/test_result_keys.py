@@ -27,6 +27,7 @@ def test_an_amount_is_read_as_people_write_it(text):
     [
         (PAINT, {"thickness_um": "60"}, "'60' is no amount with a tolerance; write it as 60 ± 10"),
         (PAINT, {"thickness_um": 60}, "no amount with a tolerance"),
+        (PAINT, {"thickness_um": "60 ± 0"}, "tolerance\n.*greater than 0"),
         (PAINT, {"thickness_um": "10 ± 10"}, "a tolerance of 10 on 10; it must be below"),
         (PAINT, {"thickness_um": {"value": 9, "tolerance": 1, "most": 5}}, "most is 5, less than"),
         (PAINT, {"thickness_um": "6 ± 1", "removal_um": "6 ± 1"}, "not both"),

@@ -26,7 +26,7 @@ def export(
     program_number: int = 1,
     process_only: bool = False,
     blend_mm: float = 1.0,
-    acceleration_m_s2: Annotated[float, Metavar("M/S2")] = 0.5,
+    acceleration_m_s2: Annotated[float | None, Metavar("M/S2")] = None,
     rotary: Literal["AC", "BC"] = "AC",
     tilt: Literal["positive", "negative"] = "positive",
     without_tcp_control: bool = False,
@@ -61,7 +61,8 @@ def export(
         process_only: Leave approach and retract out.
         blend_mm: How far from a waypoint a robot may round it (urscript, rapid, krl); 0: it stops
             at each.
-        acceleration_m_s2: Acceleration of the tool centre point (urscript).
+        acceleration_m_s2: Acceleration of the tool centre point (urscript); 2, which feeds are
+            planned with, unless given.
         rotary: Rotary axes of the machine tool (gcode).
         tilt: Sign of the A or B axis (gcode); either reaches every direction.
         without_tcp_control: The machine's own X Y Z instead of G43.4 (gcode); its two rotary tables
@@ -86,11 +87,12 @@ def export(
         "program_number": program_number,
         "process_only": process_only,
         "blend_mm": blend_mm,
-        "acceleration_m_s2": acceleration_m_s2,
         "rotary": rotary,
         "tilt": tilt,
         "without_tcp_control": without_tcp_control,
     }
+    if acceleration_m_s2 is not None:
+        given["acceleration_m_s2"] = acceleration_m_s2
     if cell is None:
         if not format:
             raise ConfigError("nrdf export needs --format, or --cell\nsee nrdf export --help")

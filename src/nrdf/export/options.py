@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from nrdf.cell.work_cell import WorkCell
 from nrdf.errors import ProcessError, unknown_name
+from nrdf.toolpath.types import ACCELERATION_M_S2
 
 ToolZ = Literal["into", "out"]
 
@@ -39,7 +40,7 @@ class Options:
     """Leave approach and retract out."""
     blend_mm: float = 1.0
     """How far from a waypoint a robot may round it (urscript, rapid, krl); 0: it stops at each."""
-    acceleration_m_s2: float = 0.5
+    acceleration_m_s2: float = ACCELERATION_M_S2
     """Acceleration of the tool centre point (urscript)."""
     rotary: Literal["AC", "BC"] = "AC"
     """Rotary axes of the machine tool (gcode)."""

@@ -10,6 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from nrdf.process.quantities import PlausibleRange, Positive, Quantities
+from nrdf.toolpath.types import ACCELERATION_M_S2
 
 _NUMBER = r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*(?:±|\+/-|\+-)\s*({_NUMBER})\s*(?:µm|μm|um)?\s*")
@@ -62,7 +63,7 @@ class FeedLimitKeys(Quantities):
     """Least speed along lines."""
     most_m_s: Annotated[Positive, PlausibleRange(1e-4, 5.0)] = 1.0
     """Largest speed along lines."""
-    acceleration_m_s2: Annotated[Positive, PlausibleRange(0.01, 50.0)] = 2.0
+    acceleration_m_s2: Annotated[Positive, PlausibleRange(0.01, 50.0)] = ACCELERATION_M_S2
     """Largest acceleration, along the lines and at their bends."""
 
     @model_validator(mode="after")

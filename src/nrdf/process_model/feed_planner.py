@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix, diags
 
 from nrdf.errors import ProcessError
 from nrdf.process_model.moves import Moves
+from nrdf.toolpath.types import ACCELERATION_M_S2
 
 _KEPT = 0.3  # share of the tolerance from which a deviation costs more
 _MORE = 30.0  # times
@@ -32,7 +33,7 @@ class FeedLimits:
 
     least_m_s: float = 0.01
     most_m_s: float = 1.0
-    acceleration_m_s2: float = 2.0
+    acceleration_m_s2: float = ACCELERATION_M_S2
 
     def __post_init__(self) -> None:
         if not 0.0 < self.least_m_s <= self.most_m_s < 100.0:

@@ -14,6 +14,10 @@ from nrdf.geometry.polylines import step_lengths
 from nrdf.geometry.similarity import Similarity
 from nrdf.toolpath.strategy import Strategy
 
+ACCELERATION_M_S2 = 2.0
+"""Of the tool centre point along lines: what feeds are planned with, and programs drive with,
+unless given."""
+
 SegmentKind = Literal["approach", "process", "transition", "retract"]
 
 
