@@ -10,6 +10,7 @@ import pytest
 from builders.solids import box
 from nrdf.geometry.canonical import canonical_transform
 from nrdf.shapes.families import get_family
+from nrdf.shapes import registration
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 SETTINGS = RegistrationSettings(iterations=10)
@@ -127,3 +128,15 @@ def test_a_template_serves_many_targets_and_is_not_changed():
     again = [template.register(*target).points for target in targets]
     np.testing.assert_array_equal(first, again)
     assert np.abs(first[0] - first[1]).max() > 0.05
+
+
+def test_small_clouds_are_matched_as_trees_would(monkeypatch):
+    points, normals = box((1.0, 0.5, 0.3), 200)
+    target = box((0.9, 0.6, 0.3), 300, seed=1)
+    template = RegistrationTemplate(points, normals, SETTINGS)
+    found = template.register(*target)
+    monkeypatch.setattr(registration, "_ALL_COMPARED", 0)
+    by_trees = template.register(*target)
+    for values, expected in zip(vars(found).values(), vars(by_trees).values(), strict=True):
+        np.testing.assert_allclose(values, expected, atol=1e-3)
+    assert found.back.shape == (300,)

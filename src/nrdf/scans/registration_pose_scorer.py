@@ -8,7 +8,7 @@ sides, such as a table, costs the same in both, and is reported as ambiguous.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,6 +28,15 @@ _MOVED = 5.0  # cost of moving by a canonical length
 _SETTINGS = RegistrationSettings(iterations=8)
 _OTHER_YAWS = np.pi / 2 * np.arange(1, 4)
 _MUCH = 0.15  # difference of cost from which another yaw is much better
+
+
+class _Scored(NamedTuple):
+    """A target, some of its points and normals (n, 3), and their cost as they are."""
+
+    target: EncodedCloud
+    points: np.ndarray
+    normals: np.ndarray
+    cost: float
 
 
 class RegistrationPoseScorer(PoseScorer):
@@ -50,6 +59,7 @@ class RegistrationPoseScorer(PoseScorer):
                 "+X forward and +Y up (--reference)"
             )
         super().__init__(model, prototypes, None)
+        self._latest: _Scored | None = None
         self._templates = []
         for cloud in self._clouds:
             chosen = even_subset(cloud.points, _FINE_POINTS)
@@ -80,29 +90,38 @@ class RegistrationPoseScorer(PoseScorer):
 
     def cost_of(self, target: EncodedCloud) -> float:
         """As of `PoseScorer`."""
-        chosen = sparse_subset(target.points, _SCORED_POINTS)
-        return self._cost(target.points[chosen], target.normals[chosen])
+        return self._scored(target).cost
 
     def better_yaw(self, target: EncodedCloud) -> float | None:
         """As of `PoseScorer`: of the quarter turns."""
-        chosen = sparse_subset(target.points, _SCORED_POINTS)
-        points, normals = target.points[chosen], target.normals[chosen]
+        _, points, normals, as_given = self._scored(target)
+        if as_given <= _MUCH:
+            return None
         costs = []
-        for yaw in (0.0, *_OTHER_YAWS):
+        for yaw in _OTHER_YAWS:
             turn = rotation_about_up(yaw)
             turned = points @ turn
             centre, scale = canonical_transform(turned)
             costs.append(self._cost((turned - centre) / scale, normals @ turn))
         best = int(np.argmin(costs))
-        return float(_OTHER_YAWS[best - 1]) if costs[best] < costs[0] - _MUCH else None
+        return float(_OTHER_YAWS[best]) if costs[best] < as_given - _MUCH else None
+
+    def _scored(self, target: EncodedCloud) -> _Scored:
+        """The points of a target that tell, and its cost; those of the latest are kept."""
+        latest = self._latest
+        if latest is None or latest.target is not target:
+            chosen = sparse_subset(target.points, _SCORED_POINTS)
+            points, normals = target.points[chosen], target.normals[chosen]
+            latest = self._latest = _Scored(target, points, normals, self._cost(points, normals))
+        return latest
 
     def _cost(self, points: np.ndarray, normals: np.ndarray) -> float:
         costs = []
         for template in self._templates:
-            moved = template.register(points, normals).points
-            there, back = _distances(moved, template.normals, points, normals)
-            change = np.linalg.norm(moved - template.points, axis=1).mean()
-            costs.append(_unexplained(there) + _unexplained(back) + _MOVED * float(change))
+            found = template.register(points, normals)
+            change = np.linalg.norm(found.points - template.points, axis=1).mean()
+            unexplained = _unexplained(found.distance) + _unexplained(found.back)
+            costs.append(unexplained + _MOVED * float(change))
         return float(np.mean(costs))
 
 

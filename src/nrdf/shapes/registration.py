@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 Array = np.ndarray
 _NEIGHBOURS = 4
+_ALL_COMPARED = 2**19  # pairs of points up to which comparing all of them is faster than trees
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,13 @@ class Registration:
     points: (n, 3) mapped template points, smooth, near the target's surface.
     target_index: (n,) nearest target point in (position, normal).
     distance: (n,) distance to it in (position, weighted normal).
+    back: (m,) distance of each target point from the nearest of `points`, likewise.
     """
 
     points: Array
     target_index: Array
     distance: Array
+    back: Array
 
 
 class RegistrationTemplate:
@@ -104,8 +107,8 @@ class RegistrationTemplate:
                 sums[:, column] += np.bincount(moved_index, pulled[:, column], len(base))
             smooth = kernel @ sums
             moved = base + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-6)
-        distance, index, _, _ = _match(moved, own, target, normals, s.normal_weight_end)
-        return Registration(moved.astype(np.float32), index, distance)
+        distance, index, back, _ = _match(moved, own, target, normals, s.normal_weight_end)
+        return Registration(moved.astype(np.float32), index, distance, back)
 
     def _from_box(self, target: Array) -> Array:
         """The template on its way from its own place to the target's bounding box."""
@@ -140,9 +143,25 @@ def _match(
     """Nearest neighbours both ways in (position, weighted normal): distances and indices."""
     moved_features = np.concatenate([moved, normal_weight * own], 1)
     target_features = np.concatenate([target, normal_weight * normals], 1)
+    if len(moved) * len(target) <= _ALL_COMPARED:
+        return _match_all(moved_features, target_features)
     to_target, target_index = cKDTree(target_features).query(moved_features)
     to_moved, moved_index = cKDTree(moved_features).query(target_features)
     return to_target, target_index, to_moved, moved_index
+
+
+def _match_all(one: Array, two: Array) -> tuple[Array, Array, Array, Array]:
+    """As of `_match`, of features (n, 6) and (m, 6), by comparing all with all."""
+    index, back = _nearest_of_all(one, two), _nearest_of_all(two, one)
+    there, here = one - two[index], two - one[back]
+    return np.sqrt((there**2).sum(1)), index, np.sqrt((here**2).sum(1)), back
+
+
+def _nearest_of_all(one: Array, two: Array) -> Array:
+    """For each of (n, 6) the nearest of (m, 6): that of the least |b|² - 2ab, one product."""
+    left = np.concatenate([one, np.ones((len(one), 1), one.dtype)], 1)
+    right = np.concatenate([-2 * two, (two**2).sum(1, keepdims=True)], 1)
+    return np.asarray((left @ right.T).argmin(1))
 
 
 def _squared_distances(points: Array) -> Array:

@@ -16,13 +16,14 @@ import numpy as np
 import nrdf
 from nrdf.errors import ConfigError, unknown_name
 from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.field.general import GENERAL
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
 from nrdf.scans.aligned_scan import AlignedScan, clean_and_align, pose_scorer
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf_benchmark.methods.learned import FieldMethod
-from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method
+from nrdf_benchmark.methods.registry import METHODS, Method, MethodSpec, build_method
 from nrdf_benchmark.objects.dataset import (
     LabelledMesh,
     Labels,
@@ -148,9 +149,10 @@ class ObjectRetrieval:
         regions, target_cloud = self.regions(reference), self.target_cloud(target, views)
         match, cloud = build_method(spec), self.whole_cloud(reference).cloud
         matches: dict[str, Match] = {}
+        encoded = self._encoded_for(match, target_cloud)
         start = time.perf_counter()
         if isinstance(match, FieldMethod):
-            matches = match.find(cloud, regions, target_cloud.encoded)
+            matches = match.find(cloud, regions, encoded)
             if target_cloud.aligned is not None:
                 matches = {name: m.in_scan(target_cloud.aligned) for name, m in matches.items()}
             found = {name: m.indices for name, m in matches.items()}
@@ -158,6 +160,12 @@ class ObjectRetrieval:
             found = match(cloud, regions, target_cloud.canonical)
             found = {name: target_cloud.in_cloud(indices) for name, indices in found.items()}
         return found, matches, time.perf_counter() - start
+
+    def _encoded_for(self, match: Method, target: TargetCloud) -> EncodedCloud:
+        """The target as a method's own model sees it, in the pose that was found for all."""
+        if isinstance(match, FieldMethod) and match.model.preset == GENERAL:
+            return match.model.encode(target.encoded.cloud, target.encoded.pose)
+        return target.encoded
 
     def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> ObjectPairResult:
         """Find all parts of a reference on a target by one method, and score them."""
@@ -225,7 +233,8 @@ def shared_retrieval(settings: Settings) -> ObjectRetrieval:
 def check_choice(methods: Sequence[str], views: Sequence[int]) -> None:
     """Raises ConfigError for a method that gives no sets of a target's points, and for no views or
     the same twice."""
-    able = [n for n, e in METHODS.items() if not e.is_learned or n in ("nrdf", "nrdf-refined")]
+    masks = ("nrdf", "nrdf-refined", GENERAL)
+    able = [name for name, entry in METHODS.items() if not entry.is_learned or name in masks]
     for name in methods:
         if name not in able:
             raise ConfigError(unknown_name("method for objects", name, able))

@@ -22,3 +22,9 @@ def test_chair_regions_face_the_right_way() -> None:
         for name in ("arm-left", "arm-right"):
             if (region == name).sum() > 20:
                 assert np.median(sample.normals[region == name, 1]) > 0.7
+
+
+def test_arms_as_high_as_the_wings_leave_them_out() -> None:
+    member = get_family("chair").member(1610384486)
+    slots = {part.slot for part in member.parts}
+    assert "arm-right" in slots and "wing-right" not in slots

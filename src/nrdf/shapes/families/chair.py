@@ -140,6 +140,8 @@ def _sofa_arms(rng: np.random.Generator, seat: Seat, back: Back) -> list[Part]:
     if back.height > 0.45 and chance(rng, 0.45):
         top = back.bottom + back.height * rng.uniform(0.75, 0.95)
         foot = upper - 0.05
+        if top <= foot:
+            return parts  # arms as high as that leave no back for wings
         (x0, z0, thick), (x1, z1, _) = back.edge(foot), back.edge(top)
         reach = thick + rng.uniform(0.05, 0.2)
         length = smooth([0, 0.6, 1], reach * np.array([1, rng.uniform(0.7, 1.1), 0.6]) / 2)
