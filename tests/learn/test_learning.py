@@ -8,6 +8,7 @@ import trimesh
 
 from builders.desk_lamps import lamp, write_lamps
 from nrdf.errors import DataError
+from nrdf.field.general import GENERAL
 from nrdf.learn import judge, learning
 from nrdf.learn.judge import Errors
 from nrdf.learn.learning import FIELD, REFINED, choose, learn
@@ -74,16 +75,28 @@ def test_started_again_it_goes_on_to_the_same(learned):
 @pytest.mark.parametrize(
     ("exact", "doubt", "winner", "said"),
     [
-        ((0.01, 0.03, 0.02), (0.03, 0.03, 0.03), FIELD, "field is 50% less far off"),
-        ((0.03, 0.01, 0.02), (0.05, 0.03, 0.03), REFINED, "no more doubt"),
-        ((0.03, 0.025, 0.02), (0.01, 0.01, 0.03), "registration", "25% farther off"),
-        ((0.01, 0.03, 0.02), (0.04, 0.03, 0.03), "registration", "33% more in doubt"),
+        ((0.01, 0.03, 0.03, 0.02), (0.03, 0.03, 0.03, 0.03), FIELD, "field is 50% less far off"),
+        ((0.03, 0.01, 0.03, 0.02), (0.05, 0.03, 0.03, 0.03), REFINED, "no more doubt"),
+        ((0.03, 0.03, 0.01, 0.02), (0.05, 0.03, 0.03, 0.03), GENERAL, "general model is 50% less"),
+        ((0.01, 0.03, 0.015, 0.02), (0.05, 0.03, 0.03, 0.03), GENERAL, "25% less far off"),
+        ((0.03, 0.025, 0.03, 0.02), (0.01, 0.01, 0.01, 0.03), "registration", "25% farther off"),
+        ((0.01, 0.03, 0.03, 0.02), (0.04, 0.03, 0.03, 0.03), "registration", "33% more in doubt"),
     ],
 )
-def test_the_better_model_is_chosen_by_both_measures(exact, doubt, winner, said):
-    errors = Errors(("a",), (FIELD, REFINED, "registration"), np.array([exact]), np.array([doubt]))
+def test_the_best_model_is_chosen_by_both_measures(exact, doubt, winner, said):
+    models = FIELD, REFINED, GENERAL, "registration"
+    errors = Errors(("a",), models, np.array([exact]), np.array([doubt]))
     chosen, why = choose(errors)
     assert chosen == winner and said in why
+
+
+def test_a_category_that_the_general_model_serves_has_it_under_its_name(tmp_path, monkeypatch):
+    write_lamps(tmp_path / "in", 3)
+    monkeypatch.setattr(learning, "choose", lambda errors: (GENERAL, "it is best"))
+    found = learn(tmp_path / "in", "lamp", tmp_path / "out", config=short_config())
+    model = load_model(found.weights)
+    assert (model.preset, model.category) == (GENERAL, "lamp")
+    assert GENERAL in found.errors.models and found.shown == (GENERAL, "registration")
 
 
 def test_copies_of_one_object_are_no_kind(tmp_path):

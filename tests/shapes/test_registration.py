@@ -9,8 +9,8 @@ import pytest
 
 from builders.solids import box
 from nrdf.geometry.canonical import canonical_transform
-from nrdf.shapes.families import get_family
 from nrdf.shapes import registration
+from nrdf.shapes.families import get_family
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 SETTINGS = RegistrationSettings(iterations=10)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import DataError
+from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION, RegistrationField
 from nrdf.field.weights import load_tensors, load_weights, save_weights
 from nrdf.field.zoo import list_models, load_field
@@ -42,8 +43,7 @@ from nrdf.training.validation import validate
 log = logging.getLogger(__name__)
 
 FIELD, REFINED = "field", "refined field"
-"""Names of the candidates, beside registration."""
-GENERAL = "general"
+"""Names of the candidates that are trained, beside the general model and registration."""
 TEMPLATES = 12
 _MARGIN = 1.05  # of registration's doubt, up to which a field's is as good
 STEPS = ("reading", "aligning", "registering", "training", "judging")
@@ -56,8 +56,8 @@ Progress = Callable[[str, int, int], None]
 class Learned:
     """What came of it.
 
-    weights: the file of the better model; winner: `FIELD`, `REFINED` or registration; why: a
-    sentence; errors: of all on the held-out objects; notes: what was left out, and what to know;
+    weights: the file of the best model; winner: `FIELD`, `REFINED`, general or registration; why:
+    a sentence; errors: of all on the held-out objects; notes: what was left out, and what to know;
     used: names that were learned from; start: the model that training began with.
     """
 
@@ -74,8 +74,8 @@ class Learned:
 
     @property
     def shown(self) -> tuple[str, str]:
-        """The two models to compare: the winner, or the better field, and registration."""
-        field = self.winner if self.winner != REGISTRATION else best_field(self.errors)
+        """The two models to compare: the winner, or the best field, and registration."""
+        field = self.winner if self.winner != REGISTRATION else ranked(self.errors)[0]
         return field, REGISTRATION
 
     def describe(self) -> dict[str, Any]:
@@ -163,6 +163,7 @@ def learn(
     models = {
         FIELD: Model(field, metadata),
         REFINED: Model(field, {**metadata, "refine": True}),
+        GENERAL: load_model(GENERAL),
         REGISTRATION: load_model(REGISTRATION),
     }
     errors = measure(models, held_out, examples, telling("judging"))
@@ -177,6 +178,11 @@ def learn(
     if winner == REGISTRATION:
         plain = RegistrationField()
         save_weights(weights, plain, {k: v for k, v in facts.items() if k != "train"})
+    elif winner == GENERAL:
+        # A copy under the category's name, which says what *it* was trained on.
+        general = models[GENERAL]
+        own = {"category": category, "scores": scores, "start": start}
+        save_weights(weights, general.field, {**general.metadata, **own})
     else:
         save_weights(weights, field, {**facts, "refine": winner == REFINED})
     load_tensors(weights)
@@ -187,11 +193,9 @@ def learn(
 
 
 def find_start(data: Path, config: TrainConfig) -> str:
-    """The model that training begins with: `general` if there is one, or else the field of the zoo
-    that is least far off on the training shapes' registered correspondences."""
+    """The model that training begins with: the field of the zoo that is least far off on the
+    training shapes' registered correspondences."""
     known = [entry.name for entry in list_models() if entry.preset == config.preset]
-    if GENERAL in known:
-        return GENERAL
     settings = config.data.model_copy(update={"pools": {}})
     shapes = load_dataset(list_shapes([data]), "train", settings, "cpu")
     errors = {}
@@ -204,34 +208,41 @@ def find_start(data: Path, config: TrainConfig) -> str:
 def choose(errors: Errors) -> tuple[str, str]:
     """The name of the best model, and why, in a sentence.
 
-    The field, refined or not, that is less far off on deformed copies is the candidate. It is taken
-    if it is less far off than registration there, and not in more doubt between different objects.
+    Of the models that are less far off than registration on deformed copies, and not in more doubt
+    between different objects, the one that is least far off on copies.
     """
     exact = dict(zip(errors.models, errors.exact.mean(axis=0), strict=True))
     doubt = dict(zip(errors.models, errors.doubt.mean(axis=0), strict=True))
-    best = best_field(errors)
+    order = ranked(errors)
+    for name in order:
+        gain = 1 - exact[name] / exact[REGISTRATION]
+        if gain > 0 and doubt[name] <= _MARGIN * doubt[REGISTRATION]:
+            return name, (
+                f"the {_called(name)} is {gain:.0%} less far off than registration on deformed "
+                "copies of held-out objects, and between different ones in no more doubt"
+            )
+    best = order[0]
     gain = 1 - exact[best] / exact[REGISTRATION]
     if gain <= 0:
         return REGISTRATION, (
-            f"on deformed copies of held-out objects the field is {-gain:.0%} farther off than "
-            "registration"
+            f"on deformed copies of held-out objects the {_called(best)}, the best of the others, "
+            f"is {-gain:.0%} farther off than registration"
         )
-    if doubt[best] > _MARGIN * doubt[REGISTRATION]:
-        more = doubt[best] / doubt[REGISTRATION] - 1
-        return REGISTRATION, (
-            f"the {best} is {gain:.0%} less far off on deformed copies of held-out objects, but "
-            f"between different ones {more:.0%} more in doubt than registration"
-        )
-    return best, (
-        f"the {best} is {gain:.0%} less far off than registration on deformed copies of held-out "
-        "objects, and between different ones in no more doubt"
+    more = doubt[best] / doubt[REGISTRATION] - 1
+    return REGISTRATION, (
+        f"the {_called(best)} is {gain:.0%} less far off on deformed copies of held-out objects, "
+        f"but between different ones {more:.0%} more in doubt than registration"
     )
 
 
-def best_field(errors: Errors) -> str:
-    """The field, refined or not, that is less far off on deformed copies."""
+def ranked(errors: Errors) -> list[str]:
+    """All models but registration, the one that is least far off on deformed copies first."""
     exact = dict(zip(errors.models, errors.exact.mean(axis=0), strict=True))
-    return min((FIELD, REFINED), key=lambda name: exact[name])
+    return sorted((name for name in exact if name != REGISTRATION), key=lambda name: exact[name])
+
+
+def _called(name: str) -> str:
+    return "general model" if name == GENERAL else name
 
 
 def _write_data(data: Path, shapes: Sequence[Shape], source: str, forward: str | None) -> Path:

@@ -37,9 +37,9 @@ def learn(
     """Learn your own kind of object from 3 to 60 meshes or scans of it.
 
     Brings them into one frame, trains a field on most of them, and judges it on those kept back,
-    beside registration, which needs no training. The better of the two goes into your own model
-    zoo under the category's name: knowledge of that category then uses it. Killed at any moment,
-    the same command goes on. 20 meshes take about 4 minutes of one core.
+    beside the general model and registration, which need no training. The best goes into your own
+    model zoo under the category's name: knowledge of that category then uses it. Killed at any
+    moment, the same command goes on. 20 meshes take about 4 minutes of one core.
 
     Example: nrdf model learn meshes/ --category helmet --up z
 
