@@ -181,8 +181,8 @@ def learn(
     elif winner == GENERAL:
         # A copy under the category's name, which says what *it* was trained on.
         general = models[GENERAL]
-        own = {"category": category, "scores": scores, "start": start}
-        save_weights(weights, general.field, {**general.metadata, **own})
+        told = {"category": category, "scores": scores, "start": start}
+        save_weights(weights, general.field, {**general.metadata, **told})
     else:
         save_weights(weights, field, {**facts, "refine": winner == REFINED})
     load_tensors(weights)
