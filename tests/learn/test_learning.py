@@ -90,13 +90,14 @@ def test_the_best_model_is_chosen_by_both_measures(exact, doubt, winner, said):
     assert chosen == winner and said in why
 
 
-def test_a_category_that_the_general_model_serves_has_it_under_its_name(tmp_path, monkeypatch):
-    write_lamps(tmp_path / "in", 3)
+def test_a_category_that_the_general_model_serves_has_it_under_its_name(learned, monkeypatch):
+    folder, found, _ = learned
+    monkeypatch.setattr(learning, "measure", lambda *_: found.errors)
     monkeypatch.setattr(learning, "choose", lambda errors: (GENERAL, "it is best"))
-    found = learn(tmp_path / "in", "lamp", tmp_path / "out", config=short_config())
-    model = load_model(found.weights)
+    served = learn(folder / "in", "lamp", folder / "out", config=short_config())
+    model = load_model(served.weights)
     assert (model.preset, model.category) == (GENERAL, "lamp")
-    assert GENERAL in found.errors.models and found.shown == (GENERAL, "registration")
+    assert GENERAL in found.errors.models and served.shown == (GENERAL, "registration")
 
 
 def test_copies_of_one_object_are_no_kind(tmp_path):
