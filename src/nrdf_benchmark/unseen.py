@@ -23,6 +23,9 @@ from nrdf_benchmark.objects.dataset import read_labels, read_objects
 from nrdf_benchmark.objects.pairs import draw_pairs, parts_of
 from nrdf_benchmark.objects.sampling import sample_object
 
+UNSEEN_WEIGHTS = Path(__file__).parent / "zoo" / "general-unseen.safetensors"
+"""The general field before it saw any car, aircraft, table or desk. The zoo's `general` begins with
+these weights, and has seen all kinds."""
 _RESAMPLES = 4000
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from nrdf.errors import DataError
+from nrdf.field.weights import read_metadata
 from nrdf.io.cloud import PointCloud
 from nrdf_benchmark.unseen import (
+    UNSEEN_WEIGHTS,
     UnseenObject,
     compare,
     evaluate_unseen,
@@ -37,6 +39,13 @@ def one_off(reference, regions, target):
 
 
 THINGS = [thing("x", 0.0), thing("y", 0.5), thing("z", 1.0, ("b",))]
+
+
+def test_the_benchmarks_weights_saw_none_of_its_categories():
+    metadata = read_metadata(UNSEEN_WEIGHTS)
+    assert metadata["preset"] == "general"
+    assert set(metadata["shapes"]) == {"assemblies", "family chair", "ikea", "m3", "sh3d"}
+    assert metadata["shapes"]["ikea"]["count"] == 26, "chairs, stools and benches alone"
 
 
 def test_pairs_share_a_region_and_are_drawn_alike():

@@ -23,6 +23,8 @@ def unseen(
     Mean CD-L1 over all pairs of a category: of BSRC's regions (docs/evidence/bsrc.md) where it has
     the category, else of labelled parts (docs/evidence/objects.md). Each method is compared with
     the first one pair by pair, with an interval of 95 % over the targets. On one core.
+    `general` stands for weights of the general field that never saw a car, aircraft, table or
+    desk; `--model general=general` takes the zoo's, which has seen all of them.
 
     Example: nrdf eval unseen --bsrc bsrc/ --objects objects/ --category car plane table
 
@@ -38,8 +40,16 @@ def unseen(
     import numpy as np
 
     from nrdf_benchmark.methods.registry import build_method, find_methods
-    from nrdf_benchmark.unseen import compare, evaluate_unseen, read_unseen, unseen_pairs
+    from nrdf_benchmark.unseen import (
+        UNSEEN_WEIGHTS,
+        compare,
+        evaluate_unseen,
+        read_unseen,
+        unseen_pairs,
+    )
 
+    if "general" in method and not any(given.startswith("general=") for given in model):
+        model = (*model, f"general={UNSEEN_WEIGHTS}")
     for name in category:
         specs = find_methods(method, name, model)
         methods = {spec.name: build_method(spec) for spec in specs}
