@@ -21,7 +21,7 @@ from nrdf.commands.export import export
 from nrdf.errors import OutputError, ProcessError
 from nrdf.export.registry import export_job
 from nrdf.io.result_folder import MANIFEST
-from nrdf.toolpath.file import write_toolpaths
+from nrdf.toolpath.file import VERSION, write_toolpaths
 
 LIMITED = """
 import resource, sys
@@ -161,7 +161,7 @@ def test_verb_leaves_nothing_behind_where_it_fails(tmp_path):
     for words in (["--format", "csv", "krk"], ["--format", "csv", "krl", "--program", "if"]):
         with pytest.raises(ProcessError):
             exported(str(tmp_path), *words, "--out", str(tmp_path / "out"))
-    path.write_text(path.read_text().replace('"version":5', '"version":99'))
-    with pytest.raises(ProcessError, match="version 99; this nrdf reads versions up to 5"):
+    path.write_text(path.read_text().replace(f'"version":{VERSION}', '"version":99'))
+    with pytest.raises(ProcessError, match=f"version 99; .* reads versions up to {VERSION}:"):
         exported(str(tmp_path), "--format", "csv", "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]

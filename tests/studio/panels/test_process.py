@@ -2,6 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+
+class Given(NamedTuple):
+    """What a page's field sends."""
+
+    value: float
+
 
 def test_numbers_that_cannot_be_are_named_as_on_the_page(page):
     status = page.change(feed_mm_s=0.0)
@@ -16,11 +24,9 @@ def test_tool_clearance(page):
     tab = page.studio.panel.process
     page.does(tab.refresh)
     assert tab.tool_clearance.value == 20.0
-    tab.tool_clearance.value = 35.0
-    page.does(tab._set_tool)
+    page.does(tab._set_length, "clearance_m", Given(35.0))
     assert page.editor.document.region("top").steps[0]["tool"]["clearance_m"] == 0.035
-    tab.tool_clearance.value = -1.0
-    page.does(tab._set_tool)
+    page.does(tab._set_length, "clearance_m", Given(-1.0))
     page.does(tab.refresh)
     assert "clearance_m" in tab.status.content and "-0.001" in tab.status.content
 
@@ -50,12 +56,10 @@ def test_the_body_of_the_tool_and_what_the_page_has_no_field_for(page):
     assert "removal_um **60 ± 10 µm**" in tab.status.content
     assert "kept as it is: line_order, " in tab.status.content
     assert "order, tool.pad." in tab.status.content
-    tab.body["body_radius_m"].value = 45.0
-    page.does(tab._set_tool)
+    page.does(tab._set_length, "body_radius_m", Given(45.0))
     step = editor.document.region("top").steps[0]
-    assert step["tool"] == {**tool, "body_radius_m": 0.045, "clearance_m": 0.0}
+    assert step["tool"] == {**tool, "body_radius_m": 0.045}
     assert step["removal_um"] == wanted and step["order"] == 3
     page.paint("top", top)
-    tab.body["body_length_m"].value = 0.0
-    page.does(tab._set_tool)
+    page.does(tab._set_length, "body_length_m", Given(0.0))
     assert "body_radius_m needs body_length_m" in page.change(feed_mm_s=100.0)

@@ -61,7 +61,9 @@ class Placement:
     stand_m: float
     turntable_rad: tuple[float, ...]
     keep_out: tuple[Box, ...] = ()
-    loads: Mapping[str, tuple[float, tuple[float, float, float]]] = field(default_factory=dict)
+    loads: Mapping[str, tuple[float, tuple[float, float, float]]] = field(
+        default_factory=dict, hash=False
+    )
 
     def T_cell_base(self) -> np.ndarray:
         """Pose (4, 4) of the arm's base."""

@@ -82,11 +82,10 @@ class ProcessTab:
         inputs.on(self.kind.on_update, lambda event: self._set_kind(event.value))
         inputs.on(self.pattern.on_update, lambda event: self._change(trajectory=event.value))
         inputs.on(self.longest.on_click, lambda _: self._change(direction=None))
-        inputs.on(self.tool.on_update, lambda _: self._set_tool())
-        inputs.on(self.tool_radius.on_update, lambda _: self._set_tool())
-        inputs.on(self.tool_clearance.on_update, lambda _: self._set_tool())
-        for handle in self.body.values():
-            inputs.on(handle.on_update, lambda _: self._set_tool())
+        inputs.on(self.tool.on_update, lambda event: self._set_tool("name", event.value))
+        lengths = {"radius_m": self.tool_radius, "clearance_m": self.tool_clearance, **self.body}
+        for name, handle in lengths.items():
+            inputs.on(handle.on_update, partial(self._set_length, name))
         inputs.on(self.step.on_update, lambda event: self._select_step(event.value))
         inputs.on(self.steps.on_click, lambda event: self._change_steps(event.value))
 
@@ -169,19 +168,18 @@ class ProcessTab:
         self.context.editor.change_step(self.context.region, self.context.step, **content)
         self._changed()
 
-    def _set_tool(self) -> None:
+    def _set_length(self, name: str, event: PanelEvent) -> None:
+        length = float(event.value) / 1e3
+        self._set_tool(name, None if name in self.body and length == 0.0 else length)
+
+    def _set_tool(self, key: str, value: str | float | None) -> None:
+        """Change one key of the tool. What other fields show is not read: a plan that has just
+        ended may be writing them."""
         self.context.need_region()
         region = self.context.editor.document.region(self.context.region)
         assert region is not None
-        tool = dict(region.steps[self.context.step]["tool"])
-        tool |= {
-            "name": self.tool.value,
-            "radius_m": self.tool_radius.value / 1e3,
-            "clearance_m": self.tool_clearance.value / 1e3,
-        }
-        tool |= {name: handle.value / 1e3 or None for name, handle in self.body.items()}
-        tool = {name: value for name, value in tool.items() if value is not None}
-        self._change(tool=tool)
+        tool = {**region.steps[self.context.step]["tool"], key: value}
+        self._change(tool={name: value for name, value in tool.items() if value is not None})
 
     def _select_step(self, shown: str) -> None:
         self.context.step = int(shown.partition(":")[0]) - 1
