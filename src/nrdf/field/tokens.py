@@ -85,11 +85,10 @@ def neighbourhood(
     )
 
 
-def gather(values: Tensor, index: Tensor) -> Tensor:
-    """Rows (b, ..., c) of values (b, n, c) at index (b, ...)."""
-    start = torch.arange(len(values), device=values.device) * values.shape[1]
-    flat = index + start.view(-1, *[1] * (index.dim() - 1))
-    return values.flatten(0, 1)[flat]
+def gather(values: Tensor, indices: Tensor) -> Tensor:
+    """Rows of values (b, m, d) at indices (b, ...): (b, ..., d)."""
+    flat = indices.reshape(indices.shape[0], -1, 1).expand(-1, -1, values.shape[-1])
+    return values.gather(1, flat).reshape(*indices.shape, values.shape[-1])
 
 
 def squared_distances(first: Tensor, second: Tensor) -> Tensor:

@@ -15,12 +15,12 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.field.base import Field, Inverse
+from nrdf.field.tokens import gather
 from nrdf.training.batch import Batch
 from nrdf.training.matching import (
     assign,
     distances,
     distances_to,
-    gather,
     local_normals,
     nearest_distance,
     nearest_indices,

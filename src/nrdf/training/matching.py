@@ -6,6 +6,8 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
+from nrdf.field.tokens import gather
+
 PAIRS_AT_ONCE = 1 << 24
 """Distances held in memory at a time (64 MiB of float32)."""
 REST_BLOCK = 512
@@ -51,12 +53,6 @@ def neighbour_indices(query: Tensor, reference: Tensor, count: int) -> Tensor:
         for rows in _chunks(n, reference.shape[1], b)
     ]
     return torch.cat(found, dim=1)
-
-
-def gather(values: Tensor, indices: Tensor) -> Tensor:
-    """Rows of values (b, m, d) at indices (b, ...): (b, ..., d)."""
-    flat = indices.reshape(indices.shape[0], -1, 1).expand(-1, -1, values.shape[-1])
-    return values.gather(1, flat).reshape(*indices.shape, values.shape[-1])
 
 
 def nearest_distance(query: Tensor, reference: Tensor, squared: bool = False) -> Tensor:
