@@ -122,17 +122,3 @@ def test_shapes_are_listed_and_loaded_by_split(tmp_path):
     loaded = load_dataset(entries, "val", CONFIG, "cpu")
     assert loaded.names == ["ball-4", "ball-5"] and loaded.groups.names == ["family-ball/200"]
     assert torch.equal(loaded.surface, ShapeDataset(balls(6)[4:], CONFIG).surface)
-
-
-def test_twins_are_one_shape_twice_whose_places_correspond_exactly():
-    augment = AugmentConfig(scaling=0.3, warp=0.02)
-    found = tiny_dataset(augment=augment, twins=1.0)
-    chosen, _ = draw_shapes(found.pools, 4, 0, 0, 0, 1)
-    batch = found.batch(4, 0, 0)
-    names = [found.names[n] for n in chosen]
-    assert len({*names}) == 4
-    plain = tiny_dataset(augment=AugmentConfig(), twins=1.0).batch(4, 0, 0)
-    for pair in range(4):  # of the first roll: 0 to 1 and 2 to 3 are twins
-        same = torch.equal(plain.source[pair], plain.target[pair])
-        assert same == (pair % 2 == 0)
-    assert not torch.allclose(batch.source[0], batch.target[0], atol=0.01)

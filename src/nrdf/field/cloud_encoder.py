@@ -50,12 +50,6 @@ class CloudEncoder:
         """Name of the network's preset, such as "default"."""
         return self.field.preset
 
-    @property
-    def refines(self) -> bool:
-        """Whether the field's map is always moved onto the target by a few steps of registration,
-        as a model does that was better so (`nrdf.learn`)."""
-        return self.metadata.get("refine") is True
-
     @cached_property
     def kind_network(self) -> KindNetwork | None:
         """What tells objects of the category from others, and how they are turned; None without

@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 
 from nrdf.errors import DataError
-from nrdf.field.general import GENERAL
-from nrdf.field.registration import REGISTRATION, RegistrationField
-from nrdf.field.weights import load_tensors, load_weights, save_weights
-from nrdf.field.zoo import list_models, load_field
+from nrdf.field.general import GENERAL, GeneralField
+from nrdf.field.registration import REGISTRATION
+from nrdf.field.weights import load_tensors, save_weights
 from nrdf.geometry.similarity import up_axis, upright
 from nrdf.learn.alignment import AlignedObjects, align_objects, better_axis
 from nrdf.learn.judge import Errors, measure
 from nrdf.learn.objects import FEWEST, MOST, find_files, read_objects, too_few
 from nrdf.learn.selection import find_duplicates, hold_out
+from nrdf.learn.synchronized import synchronized_groups
 from nrdf.regions.model import Model, load_model
-from nrdf.shapes.correspond import correspond_folders
 from nrdf.shapes.dataset import (
     IndexRow,
     Shape,
@@ -34,19 +33,14 @@ from nrdf.shapes.dataset import (
     write_shape,
 )
 from nrdf.tasks import Workers
-from nrdf.training.config import TrainConfig, load_config
-from nrdf.training.dataset import load_dataset
-from nrdf.training.loop import train
-from nrdf.training.provenance import list_shapes
-from nrdf.training.validation import validate
+from nrdf.training.general_field import FineTuneSettings, fine_tune_general
 
 log = logging.getLogger(__name__)
 
-FIELD, REFINED = "field", "refined field"
-"""Names of the candidates that are trained, beside the general model and registration."""
-TEMPLATES = 12
+LEARNED = "learned"
+"""Name of the candidate that is trained, beside the general model and registration."""
 _MARGIN = 1.05  # of registration's doubt, up to which a field's is as good
-STEPS = ("reading", "aligning", "registering", "training", "judging")
+STEPS = ("reading", "aligning", "mapping", "training", "judging")
 """What `learn` does, in this order."""
 
 Progress = Callable[[str, int, int], None]
@@ -56,9 +50,9 @@ Progress = Callable[[str, int, int], None]
 class Learned:
     """What came of it.
 
-    weights: the file of the best model; winner: `FIELD`, `REFINED`, general or registration; why:
+    weights: the file of the best model; winner: `LEARNED`, general or registration; why:
     a sentence; errors: of all on the held-out objects; notes: what was left out, and what to know;
-    used: names that were learned from; start: the model that training began with.
+    used: names that were learned from.
     """
 
     weights: Path
@@ -67,14 +61,13 @@ class Learned:
     errors: Errors
     notes: tuple[str, ...]
     used: tuple[str, ...]
-    start: str
     held_out: tuple[Shape, ...]
     examples: tuple[Shape, ...]
     models: dict[str, Model]
 
     @property
     def shown(self) -> tuple[str, str]:
-        """The two models to compare: the winner, or the best field, and registration."""
+        """The two models to compare: the winner, or the best one beside it, and registration."""
         field = self.winner if self.winner != REGISTRATION else ranked(self.errors)[0]
         return field, REGISTRATION
 
@@ -83,7 +76,6 @@ class Learned:
         return {
             "winner": self.winner,
             "why": self.why,
-            "start": self.start,
             "learned_from": list(self.used),
             "notes": list(self.notes),
             "errors": self.errors.describe(),
@@ -96,7 +88,7 @@ def learn(
     out: Path,
     up: str = "y",
     forward: str | None = None,
-    config: TrainConfig | None = None,
+    settings: FineTuneSettings | None = None,
     workers: Workers = 1,
     progress: Progress | None = None,
 ) -> Learned:
@@ -150,20 +142,24 @@ def learn(
     examples = tuple(shape for shape in distinct if shape.name not in held)
 
     data = _write_data(out / "data", examples, folder.resolve().name, forward)
-    correspond_folders(
-        [data], min(TEMPLATES, len(examples)), workers, progress=telling("registering")
+    settings = settings or FineTuneSettings()
+    general = load_model(settings.start)
+    if not isinstance(general.field, GeneralField):
+        raise DataError(
+            f"training cannot begin with {settings.start}, a {general.preset} model: give a general one"
+        )
+    run = fine_tune_general(
+        general.field,
+        [data / f"{shape.name}.npz" for shape in examples],
+        lambda: synchronized_groups(general, examples, progress=telling("mapping")),
+        out / "run",
+        category,
+        settings,
+        progress=telling("training"),
     )
-    settings = config or load_config("learn")
-    start = find_start(data, settings)
-    tell("training", 0, 1)
-    run = train(settings, [data], out / "run", category=category, device="cpu", start=start)
-    tell("training", 1, 1)
-
-    field, metadata = load_weights(run)
     models = {
-        FIELD: Model(field, metadata),
-        REFINED: Model(field, {**metadata, "refine": True}),
-        GENERAL: load_model(GENERAL),
+        LEARNED: load_model(run),
+        GENERAL: general,
         REGISTRATION: load_model(REGISTRATION),
     }
     errors = measure(models, held_out, examples, telling("judging"))
@@ -174,35 +170,14 @@ def learn(
         for n, name in enumerate(errors.models)
         for what, values in (("exact", errors.exact), ("doubt", errors.doubt))
     }
-    facts: dict[str, Any] = {**metadata, "scores": scores, "start": start}
-    if winner == REGISTRATION:
-        plain = RegistrationField()
-        save_weights(weights, plain, {k: v for k, v in facts.items() if k != "train"})
-    elif winner == GENERAL:
-        # A copy under the category's name, which says what *it* was trained on.
-        general = models[GENERAL]
-        told = {"category": category, "scores": scores, "start": start}
-        save_weights(weights, general.field, {**general.metadata, **told})
-    else:
-        save_weights(weights, field, {**facts, "refine": winner == REFINED})
+    # Copies of the general model and of registration say what *they* were trained on.
+    best = models[winner]
+    save_weights(weights, best.field, {**best.metadata, "category": category, "scores": scores})
     load_tensors(weights)
     return Learned(
-        weights, winner, why, errors, tuple(notes), tuple(s.name for s in examples), start,
+        weights, winner, why, errors, tuple(notes), tuple(s.name for s in examples),
         held_out, examples, models,
     )  # fmt: skip
-
-
-def find_start(data: Path, config: TrainConfig) -> str:
-    """The model that training begins with: the field of the zoo that is least far off on the
-    training shapes' registered correspondences."""
-    known = [entry.name for entry in list_models() if entry.preset == config.preset]
-    settings = config.data.model_copy(update={"pools": {}})
-    shapes = load_dataset(list_shapes([data]), "train", settings, "cpu")
-    errors = {}
-    for name in known:
-        field = load_field(name)[0]
-        errors[name] = validate(field, shapes).get("val/error", float("inf"))
-    return min(errors, key=lambda name: errors[name])
 
 
 def choose(errors: Errors) -> tuple[str, str]:
@@ -242,7 +217,7 @@ def ranked(errors: Errors) -> list[str]:
 
 
 def _called(name: str) -> str:
-    return "general model" if name == GENERAL else name
+    return f"{name} model"
 
 
 def _write_data(data: Path, shapes: Sequence[Shape], source: str, forward: str | None) -> Path:

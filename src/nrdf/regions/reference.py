@@ -154,11 +154,11 @@ class EncodedReference:
 
     def map_surface(self, target: EncodedCloud, refine: bool = False) -> MappedPoints:
         """Where the reference's working points arrive on a target: C(z_t, k_r), refined if that is
-        asked for or the model always does."""
+        asked for."""
         start = time.perf_counter()
         mapped = self._mapper.map_working(target)
         target.seconds["map"] = time.perf_counter() - start
-        if refine or self.model.refines:
+        if refine:
             start = time.perf_counter()
             displacement = self._refiner.displacement(
                 mapped.points, mapped.normals, target.points, target.normals

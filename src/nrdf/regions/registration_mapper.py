@@ -12,6 +12,7 @@ of the target has no counterpart.
 
 from __future__ import annotations
 
+from functools import cached_property
 from threading import Lock
 from typing import ClassVar
 
@@ -56,7 +57,7 @@ class RegistrationMapper:
         self._template = RegistrationTemplate(
             source.points[self._chosen], source.normals[self._chosen], self._settings
         )
-        self._pairs: list[_RegisteredPair] = []
+        self._pairs: list[RegisteredPair] = []
         self._lock = Lock()
 
     def map_working(self, target: EncodedCloud, chosen: np.ndarray | None = None) -> MappedPoints:
@@ -76,16 +77,17 @@ class RegistrationMapper:
         """As of `SurfaceMapper`."""
         return self._pair(target).map_back(target.points[chosen], target.normals[chosen])
 
-    def _pair(self, target: EncodedCloud) -> _RegisteredPair:
+    def _pair(self, target: EncodedCloud) -> RegisteredPair:
         with self._lock:
             for pair in self._pairs:
                 if pair.target is target:
                     return pair
-            pair = self._register(target)
+            pair = self.register(target)
             self._pairs = [pair, *self._pairs][:_KEPT]
             return pair
 
-    def _register(self, target: EncodedCloud) -> _RegisteredPair:
+    def register(self, target: EncodedCloud) -> RegisteredPair:
+        """The source registered to a target, and the target to the source; nothing is kept."""
         source, back = self.source, _subset(len(target.points), _BACK_POINTS, 2)
         there = _Moved(source.points[self._chosen], source.normals[self._chosen])
         returning = _Moved(target.points[back], target.normals[back])
@@ -96,7 +98,7 @@ class RegistrationMapper:
         sample = _subset(len(source.points), 2 * _BACK_POINTS, 3)
         template = RegistrationTemplate(returning.points, returning.normals, self._settings)
         returning.register(template, source.points[sample], source.normals[sample])
-        return _RegisteredPair(source, target, there, returning)
+        return RegisteredPair(source, target, there, returning)
 
 
 class _Moved:
@@ -129,14 +131,26 @@ class _Moved:
         return points + moved[:, :3], moved[:, 3]
 
 
-class _RegisteredPair:
+class RegisteredPair:
     """A source registered to a target, and the target to the source."""
 
     def __init__(
         self, source: EncodedCloud, target: EncodedCloud, there: _Moved, back: _Moved
     ) -> None:
-        self.target, self._there, self._back = target, there, back
-        self.whole = self.map_points(source.points, source.normals)
+        self.target, self._source, self._there, self._back = target, source, there, back
+
+    @cached_property
+    def whole(self) -> MappedPoints:
+        """The source's working points on the target."""
+        return self.map_points(self._source.points, self._source.normals)
+
+    def forward(self, points: np.ndarray) -> np.ndarray:
+        """Where canonical points (m, 3) of the source arrive on the target, (m, 3)."""
+        return self._there.follow(points)[0]
+
+    def backward(self, points: np.ndarray) -> np.ndarray:
+        """Where canonical points (m, 3) of the target arrive on the source, (m, 3)."""
+        return self._back.follow(points)[0]
 
     def map_points(self, points: np.ndarray, normals: np.ndarray) -> MappedPoints:
         """Canonical points and normals (m, 3) of the source on the target."""

@@ -64,9 +64,6 @@ class DataConfig(StrictModel):
     pools: dict[str, float] = Field(default={})
     """Pattern of shape sources (first match counts) to its share of each batch; pairs are formed
     within a pool. Empty: one pool of all shapes."""
-    twins: float = Field(default=0.0, ge=0, le=1)
-    """Probability that every second shape of a batch is the one before it once more, deformed
-    anew: what corresponds is exact then, however the shape came by its lists."""
     exact_groups: list[str] = Field(default=["family-*", "shared-*"])
     """Patterns of correspondence groups whose weight 0 means "no such place", not "uncertain"."""
     weight_threshold: float = Field(default=0.05, ge=0, le=1)

@@ -113,11 +113,6 @@ class ShapeDataset:
         drawn = draw_shapes(self.pools, batch_size, seed, step, rank, world)
         chosen, pool_of = (values.to(self.device) for values in drawn)
         reference, partner = pair_up(self.pool_sizes(batch_size), config.rolls, self.device)
-        if config.twins > 0:
-            coin = torch.rand(len(chosen), generator=generator, device=self.device)
-            second = torch.arange(len(chosen), device=self.device) % 2 == 1
-            again = (coin < config.twins) & second & (pool_of == pool_of.roll(1))
-            chosen = torch.where(again, chosen.roll(1), chosen)
         surface = self.surface[chosen]
         mirror = torch.ones(len(self.pools), device=self.device)
         if config.augment.mirror:

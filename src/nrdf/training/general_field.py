@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,13 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.errors import DataError
-from nrdf.field.general import GeneralConfig, GeneralField
+from nrdf.field.general import GENERAL, GeneralConfig, GeneralField
 from nrdf.field.pair_inverse import Places, Tokens
 from nrdf.field.tokens import farthest_points, gather, squared_distances
+from nrdf.field.zoo import WEIGHTS
 from nrdf.shapes.dataset import read_shape
-from nrdf.training.general_pairs import Side, draw_pairs, make_pool
+from nrdf.training.checkpoint import latest_checkpoint, read_position
+from nrdf.training.general_pairs import Groups, Side, draw_pairs, make_pool
 from nrdf.training.provenance import list_shapes, provenance
 from nrdf.training.small_networks import (
     Settings,
@@ -93,6 +96,55 @@ def train_general(
             sources[source] = {"count": count, "licences": {"MIT": count}}
         scores = {"assemblies": float(error)}
         return write_small_network(out, field, "", settings, sources, scores)
+
+
+@dataclass(frozen=True)
+class FineTuneSettings(Settings):
+    """start: name or file of the general model that training begins with. kinds: assemblies drawn
+    at random that are shown as well, so that nothing is forgotten."""
+
+    start: str = GENERAL
+    steps: int = 300
+    batch: int = 16
+    rate: float = 4e-4
+    kinds: int = 100
+
+
+def fine_tune_general(
+    start: GeneralField,
+    shapes: Sequence[Path],
+    groups: Callable[[], Groups],
+    out: Path,
+    category: str,
+    settings: FineTuneSettings,
+    overwrite: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Train a general field (of `settings.start`) further, for one category; killed at any moment, the same call goes on.
+
+    shapes: files of its shapes, whose surfaces are deformed; groups: gives the places of their
+    points on each other (`nrdf.learn.synchronized`), asked only where training begins or goes on.
+    Writes into `out` as `train_general` does and returns the path of weights.safetensors. Raises
+    DataError for shapes that cannot be read, OutputError for a folder that holds something else.
+    """
+    names = [path.stem for path in shapes]
+    with small_run(GeneralField.preset, start.config, category, settings, names, out, overwrite):
+        checkpoint = latest_checkpoint(out)
+        done = checkpoint is not None and read_position(checkpoint).total == settings.steps
+        if done and (out / WEIGHTS).exists():
+            return out / WEIGHTS
+        field = copy.deepcopy(start)
+        found = groups()
+        surfaces = [_surface(path) for path in shapes]
+        pool = make_pool(surfaces, settings.kinds, (), 0, settings.seed, others=found)
+        torch.manual_seed(settings.seed)
+
+        def loss_at(generator: torch.Generator) -> Tensor:
+            return pair_loss(field, draw_pairs(pool, settings.batch, generator))[0]
+
+        run_steps(field, settings, loss_at, out, progress)
+        entries = list_shapes(list(dict.fromkeys(path.parent for path in shapes)))
+        return write_small_network(out, field, category, settings, provenance(entries), {})
 
 
 def pair_loss(field: GeneralField, pair: tuple[Side, Side]) -> tuple[Tensor, Tensor]:

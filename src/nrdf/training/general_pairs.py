@@ -27,7 +27,8 @@ log = logging.getLogger(__name__)
 
 POINTS = 1024
 """Of each cloud."""
-_MEMBERS = 4  # of each kind
+MEMBERS = 4
+"""Of each kind, or group of objects of one."""
 _MILD, _STRONG = (0.02, 0.12), (0.05, 0.38)  # strength of warps, of members and of surfaces
 _REFRAMED, _HEADED, _TILTED = 0.6, 0.25, 0.3  # shares of the pairs, and of the shapes
 _TILT = 0.05  # rad, standard deviation
@@ -46,12 +47,19 @@ class Side(NamedTuple):
     exists: Tensor
 
 
+class Groups(NamedTuple):
+    """k groups of m = `MEMBERS` objects, and the places of the own n = `POINTS` points of all of
+    them on each: points, normals (k, m, m · n, 3), float16; exists (k, m, m · n), bool."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    exists: np.ndarray
+
+
 @dataclass(frozen=True)
 class PairPool:
-    """What pairs are made of, in half precision to fit into memory.
-
-    Of k kinds the places of the own points of all m members on each of them: points, normals
-    (k, m, m · n, 3), exists (k, m, m · n). surfaces, surface_normals (s, p, 3)."""
+    """What pairs are made of, in half precision to fit into memory: `Groups` as tensors, and
+    surfaces, surface_normals (s, p, 3)."""
 
     points: Tensor
     normals: Tensor
@@ -67,9 +75,10 @@ def make_pool(
     family_groups: int,
     seed: int,
     progress: Callable[[int, int], None] | None = None,
+    others: Groups | None = None,
 ) -> PairPool:
-    """Random kinds, groups of members of parametric families, and surfaces (points and normals
-    (p, 3), as many of each)."""
+    """Random kinds, groups of members of parametric families, other groups, and surfaces (points
+    and normals (p, 3), as many of each)."""
     rng = np.random.default_rng(seed)
     groups = []
     wanted = [None] * kinds + [name for name in families for _ in range(family_groups)]
@@ -77,8 +86,9 @@ def make_pool(
         groups.append(_located(_kind(rng) if name is None else _family(name, rng), rng))
         if progress is not None:
             progress(done, len(wanted))
-    stacked = (np.stack(values) for values in zip(*groups, strict=True))
-    points, normals, exists = (torch.from_numpy(values) for values in stacked)
+    made = [Groups(*(np.stack(values) for values in zip(*groups, strict=True)))] if groups else []
+    every = zip(*made, *([] if others is None else [others]), strict=True)
+    points, normals, exists = (torch.from_numpy(np.concatenate(values)) for values in every)
     half = np.array(surfaces, np.float16).reshape(len(surfaces), 2, -1 if surfaces else 0, 3)
     return PairPool(points, normals, exists, *torch.from_numpy(half).unbind(1))
 
@@ -120,12 +130,12 @@ def draw_pairs(pool: PairPool, count: int, generator: torch.Generator) -> tuple[
 
 def _kind(rng: np.random.Generator) -> list[Member]:
     kind = Kind(rng)
-    return [kind.member(rng) for _ in range(_MEMBERS)]
+    return [kind.member(rng) for _ in range(MEMBERS)]
 
 
 def _family(name: str, rng: np.random.Generator) -> list[Member]:
     found: list[Member] = []
-    while len(found) < _MEMBERS:
+    while len(found) < MEMBERS:
         try:
             found.append(get_family(name).member(int(rng.integers(2**31))))
         except ValueError as error:  # a few seeds of a family have no member
@@ -155,7 +165,7 @@ def _draw_places(
         members = count
     own, other, exists = [], [], []
     kinds = torch.from_numpy(rng.integers(len(pool.points), size=members)) if members else None
-    which = torch.from_numpy(np.stack([rng.permutation(_MEMBERS)[:2] for _ in range(count)]))
+    which = torch.from_numpy(np.stack([rng.permutation(MEMBERS)[:2] for _ in range(count)]))
     rows = torch.from_numpy(rng.integers(max(len(pool.surfaces), 1), size=count - members))
     for side in range(2):
         here, there = [], []

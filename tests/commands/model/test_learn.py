@@ -26,7 +26,7 @@ def test_one_command_gives_a_model_that_knowledge_of_the_category_uses(tmp_path,
     words = f"model learn {tmp_path}/in --category lamp --out {tmp_path}/out --steps 1 --workers 1"
     assert cli.run(words.split()) == 0
     said = capsys.readouterr()
-    assert "learned from 2 objects, starting with the model" in said.out
+    assert "learned from 2 objects; judged on 1" in said.out
     assert "against registration" in said.out and "one object only" in said.out
     assert f"the model 'lamp' is now in your zoo ({own_zoo})" in said.out
     assert "training (step 4 of 5)" in said.err
