@@ -14,6 +14,7 @@ import pytest
 
 from nrdf import cli
 from nrdf.bundled import REAL, bundled_chair, bundled_mesh
+from nrdf.commands.demo_new_kind import NewKind
 from nrdf.io.cloud import read_cloud
 from nrdf.io.result_folder import MANIFEST
 from nrdf.process.bound_knowledge import read_bound_knowledge
@@ -23,6 +24,8 @@ from nrdf.reports.job_meshes import read_job_meshes
 
 def test_demo_compares_with_the_truth_and_ends_with_programs(untrained, tmp_path, monkeypatch):
     monkeypatch.setattr("nrdf.bundled.TARGETS", ("rocker",))
+    shown = NewKind("a table has no model", 0.9, None, 1.0)  # has a test of its own
+    monkeypatch.setattr("nrdf.commands.demo.transfer_new_kind", lambda *_: shown)
     out = tmp_path / "demo"
     assert cli.run(["demo", "--no-arm", "--model", str(untrained), "--out", str(out)]) == 0
     report = json.loads((out / "report.json").read_text())

@@ -17,6 +17,7 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
+from nrdf.commands.demo_new_kind import FOLDER, KIND, transfer_new_kind
 from nrdf.commands.options import Folder
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
     from nrdf.process.transfer import ProcessTransfer
     from nrdf.process.transfer_result import TransferResult
-    from nrdf.viz.picture import Panel
 
 EXPORTED = ("urscript", "csv")
 SCAN_YAW, SCAN_PLACE_M = 2.1, (1.2, -0.7, 0.45)
@@ -50,7 +50,8 @@ def demo(
     its scan is cleaned and aligned, its tool paths are planned on the scan, measured against its
     true mesh, and run on a simulated arm that meets the true mesh. The others are members of the
     parametric family that no training set holds, so their true regions are known exactly; the
-    table shows found against true.
+    table shows found against true. Last, a table, a kind without a model of its own, has its top
+    painted: the general model finds it.
 
     Example: nrdf demo --out demo --overwrite
 
@@ -67,6 +68,7 @@ def demo(
     with output_folder(out, overwrite, [model]) as folder:
         results = _run(folder, model, device)
         simulated = _simulate(folder) if not no_arm else None
+        other = transfer_new_kind(folder, {"command": command_line(), "versions": versions()})
     _show(results)
     console.print(
         f"{REAL}: a real chair, scanned in an unknown pose. off mesh: 99 % of what its tool paths "
@@ -79,6 +81,11 @@ def demo(
         console.print(f"\n{REAL} on the bundled arm, in simulation:")
         show_simulation(simulated)
         console.print(f"{first}/simulation/report.html shows it, with a film")
+    console.print(
+        f"\n{out}/{FOLDER}: {other.note}. The top of a {KIND}, taught on another {KIND}: IoU with "
+        f"the true one {other.iou:.2f}, {_or_dash(other.coverage, '.0%')} of it painted, planned "
+        f"in {other.seconds:.1f} s; picture.png shows it"
+    )
     console.print(
         f"\npicture and report in {out}; for each chair a job: {first}/report.html shows it.\n"
         f"Next, for instance, change {out}/chair.yaml, then\n"
@@ -121,7 +128,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
     from nrdf.export.registry import export_job
     from nrdf.process.limits import Limits
     from nrdf.process.transfer import ProcessTransfer
-    from nrdf.reports.job_folder import job_of, panel_of, write_job_files
+    from nrdf.reports.job_folder import job_of, panel_of, panel_of_reference, write_job_files
     from nrdf.viz.picture import draw_regions
 
     loaded = nrdf.load_model(model, device)
@@ -134,7 +141,7 @@ def _run(folder: Path, model: str, device: str) -> list[Found]:
         every = (REAL, *TARGETS)
         progress(0, len(every) + 1)
         process_transfer = ProcessTransfer(_write_knowledge(folder), loaded)
-        panels = [_reference_panel(REFERENCE, process_transfer)]
+        panels = [panel_of_reference(process_transfer, REFERENCE)]
         results: list[Found] = []
         for done, chair in enumerate(every, 1):
             progress(done, len(every) + 1)
@@ -243,19 +250,6 @@ def _write_knowledge(folder: Path) -> Any:
     changes = {"reference": reference, "regions": regions}
     write_knowledge(folder / "chair.yaml", bound.knowledge.model_copy(update=changes))
     return bound
-
-
-def _reference_panel(title: str, process_transfer: ProcessTransfer) -> Panel:
-    """The reference with its regions, and what each process does there."""
-    from nrdf.viz.picture import Panel
-
-    lines: dict[str, list[np.ndarray]] = {}
-    for region, number, _ in process_transfer.steps():
-        lines.setdefault(region, []).extend(process_transfer.reference_contacts(region, number))
-    paths = process_transfer.reference_paths
-    regions = {name: region.mesh for name, region in paths.regions.found.items()}
-    note = f"{len(regions)} regions, each with a process of its own"
-    return Panel.of_mesh(title, paths.surface.mesh, regions, lines, note=note)
 
 
 def _compare(chair: str, result: TransferResult, truth: dict[str, np.ndarray]) -> list[Found]:

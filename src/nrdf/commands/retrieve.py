@@ -183,9 +183,9 @@ def reference_indices(
     regions: Mapping[str, np.ndarray], reference: PointCloud
 ) -> dict[str, np.ndarray]:
     """Each region as indices of the reference's points."""
-    from nrdf.regions.region import region_indices
+    from nrdf.regions.region import whole_region
 
-    return {name: region_indices(values, reference) for name, values in regions.items()}
+    return {name: whole_region(values, reference) for name, values in regions.items()}
 
 
 def region_panel(

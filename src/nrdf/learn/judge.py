@@ -1,4 +1,4 @@
-"""How far two models are off, on objects that neither has learned from.
+"""How far models are off, on objects that none of them has learned from.
 
 Truth is known where a held-out object is mapped onto a copy of itself that is scaled, stretched and
 bent by a known map, and sampled anew: the place of every point is exact. Between different objects

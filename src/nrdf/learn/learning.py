@@ -146,7 +146,8 @@ def learn(
     general = load_model(settings.start)
     if not isinstance(general.field, GeneralField):
         raise DataError(
-            f"training cannot begin with {settings.start}, a {general.preset} model: give a general one"
+            f"training cannot begin with {settings.start}, a model of the preset {general.preset}: "
+            "give a general one"
         )
     run = fine_tune_general(
         general.field,

@@ -18,7 +18,7 @@ from nrdf.io.model_file import listed
 from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import read_knowledge
 from nrdf.regions.files import read_region_file
-from nrdf.regions.region import region_indices
+from nrdf.regions.region import whole_region
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +67,7 @@ def resolve(
     for region in knowledge.regions:
         try:
             given = _given(region, folder, unit)
-            regions[region.name] = np.unique(region_indices(given, cloud))
+            regions[region.name] = whole_region(given, cloud)
         except NrdfError as error:
             faults.append(f"region '{region.name}': {error}")
     faults += [] if knowledge.allow_overlap else overlaps(regions)
@@ -192,7 +192,7 @@ def _unit_vectors(vectors: list[tuple[float, float, float]], origin: str) -> np.
 
 
 def _given(region: Region, folder: Path, unit: str) -> np.ndarray:
-    """A region as `region_indices` takes it, points in metres."""
+    """A region as `whole_region` takes it, points in metres."""
     if region.file is None:
         ways = (region.mask, region.indices, region.points_m)
         return np.array(next(way for way in ways if way is not None))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from nrdf.errors import RegionError
 from nrdf.io.cloud import PointCloud
 from nrdf.io.file_names import file_name_problem
+from nrdf.regions.sparse_points import points_between
 
 ON_REFERENCE = 0.02
 """Largest distance of a region's point from the reference, as a share of its longest side."""
@@ -76,6 +77,17 @@ def region_indices(
         found = cKDTree(reference.points) if tree is None else tree()
         return _nearest_indices(values.astype(np.float64), found)
     raise RegionError(f"{_FORMS}, not an array of {values.dtype} of shape {values.shape}")
+
+
+def whole_region(region: ArrayLike | PointCloud, reference: PointCloud) -> np.ndarray:
+    """Ascending indices (k,) of a region as of `region_indices`, without gaps: where it is given by
+    points that are sparser than the reference's own, those between them are in it too."""
+    indices = region_indices(region, reference)
+    points = region.points if isinstance(region, PointCloud) else np.asarray(region)
+    if points.ndim == 2 and reference.normals is not None:
+        between = points_between(points, indices, reference.points, reference.normals)
+        indices = np.concatenate([indices, between])
+    return np.unique(indices)
 
 
 def _nearest_indices(points: np.ndarray, reference: cKDTree) -> np.ndarray:

@@ -21,6 +21,7 @@ from nrdf.process.knowledge import Knowledge, Reference, Region
 from nrdf.process.knowledge_file import write_knowledge
 from nrdf.process.limits import Limits
 from nrdf.process.strategy import strategy_of
+from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
 from nrdf.regions.files import write_matches
 from nrdf.reports.html import write_transfer_html
@@ -111,6 +112,19 @@ def job_of(result: TransferResult) -> Job:
         paths=tuple(step.path for step in result.paths if step.path is not None),
         pose=result.pose,
     )
+
+
+def panel_of_reference(process_transfer: ProcessTransfer, title: str) -> Panel:
+    """The reference with its regions, and what each process does there, for a picture."""
+    lines: dict[str, list[np.ndarray]] = {}
+    for region, number, _ in process_transfer.steps():
+        lines.setdefault(region, []).extend(process_transfer.reference_contacts(region, number))
+    paths = process_transfer.reference_paths
+    regions = {name: region.mesh for name, region in paths.regions.found.items()}
+    note = f"{len(regions)} regions, each with a process of its own"
+    if len(regions) == 1:
+        note = f"taught: {next(iter(regions))}"
+    return Panel.of_mesh(title, paths.surface.mesh, regions, lines, note=note)
 
 
 def panel_of(result: TransferResult, title: str, note: str = "") -> Panel:

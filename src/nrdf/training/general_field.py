@@ -120,7 +120,8 @@ def fine_tune_general(
     overwrite: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Train a general field (of `settings.start`) further, for one category; killed at any moment, the same call goes on.
+    """Train a general field, of `settings.start`, further for one category; killed at any moment,
+    the same call goes on.
 
     shapes: files of its shapes, whose surfaces are deformed; groups: gives the places of their
     points on each other (`nrdf.learn.synchronized`), asked only where training begins or goes on.

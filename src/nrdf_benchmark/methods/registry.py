@@ -163,8 +163,10 @@ def _find_method(
     else:
         path = _trained(name, entry, category, runs)
     metadata = read_metadata(path)
-    category = "" if entry.any_category else category
-    for kind, wanted in (("category", category), ("preset", entry.preset)):
+    needed = {"preset": entry.preset}
+    if not entry.any_category:
+        needed["category"] = category
+    for kind, wanted in needed.items():
         if metadata.get(kind) != wanted:
             raise ModelError(
                 f"method '{name}' on category {category} needs weights of {kind} '{wanted}', but "
