@@ -30,6 +30,13 @@ def test_a_simulation_is_shown_played_and_put_away_with_its_object(page, playbac
     assert "top, sand" in studio.panel.robot.now.content
     assert simulation._advance(0.1) and simulation.time_s > 0.5 * playback.seconds
     assert not simulation._advance(playback.seconds), "the end"
+    page.does(studio.panel.robot._play)  # Pause, pressed as the end came
+    assert not simulation.player.playing and simulation.time_s == playback.seconds
+    simulation._ended_at -= 60.0
+    page.does(studio.panel.robot._play)
+    assert simulation.player.playing and simulation.time_s < playback.seconds
+    page.does(studio.panel.robot._play)
+    assert not simulation.player.playing
     page.does(simulation.show, False)
     assert studio.visible_objects() == [REFERENCE, "new"] and simulation.occupied_points is None
     page.editor.change_numbers("top", 0, {"stepover_mm": 15.0})

@@ -66,6 +66,8 @@ def studio(
             "the cell file says robot and tool frame: leave --robot, --tool-frame out"
         )
     chosen = StudioCell(robot, tool_frame) if cell is None else StudioCell.of(cell)
+    if robot is tool_frame is cell is None:
+        chosen = StudioCell.kept(session) or chosen
     categories = [entry.category for entry in list_models() if entry.category]
     if not categories:
         raise ModelError("there is no trained model in this installation: install nrdf again")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
 import viser
 
 from nrdf.errors import RobotError
@@ -18,11 +20,10 @@ from nrdf.studio.scene.arm_view import ArmView
 from nrdf.studio.scene.player import Player
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from nrdf.studio.model.playback import Playback
 
 SIMULATION = "sim"
+_LATE_S = 1.5  # after the end, in which a click is for what was there before
 
 
 class Status(Protocol):
@@ -57,6 +58,7 @@ class ArmSimulation:
         """The job's folder."""
         self.on_time: Callable[[], None] = lambda: None
         """Called when the time has gone on."""
+        self._ended_at = -np.inf
         self._arm_view: ArmView | None = None
         self._process: SimulationProcess | None = None
         self._result: TargetResult | None = None
@@ -192,6 +194,14 @@ class ArmSimulation:
             self.player.pause()
         self.context.arrange()
 
+    def play_or_pause(self) -> None:
+        """Pause where it plays, else play. Who presses Pause as the end comes wants no new
+        beginning."""
+        if self.player.playing:
+            self.player.pause()
+        elif time.monotonic() - self._ended_at > _LATE_S:
+            self.play()
+
     def play(self) -> None:
         """Play from the shown moment, or from the beginning where that is the end."""
         if not self.shown:
@@ -219,6 +229,7 @@ class ArmSimulation:
             self.seek(min(self.time_s + seconds, end))
             more = self.time_s < end
             if not more:
+                self._ended_at = time.monotonic()
                 self.player.pause()
             self.on_time()
             return more

@@ -242,6 +242,12 @@ class StudioContext(ABC):
         self._read(f"reading {shown_name(name)}", then,
                    lambda told: self.results.read_knowledge(name, content, told))  # fmt: skip
 
+    def read_cell(self, file: Any, then: Callable[[StudioCell], None]) -> None:
+        """Keep a cell file that a browser sent with the session, and give its cell to `then`."""
+        name, content = file.name, file.content
+        self._read(f"reading {shown_name(name)}", then,
+                   lambda told: self.results.store_cell(name, content, told))  # fmt: skip
+
     def _read(
         self, what: str, then: Callable[[Any], None], read: Callable[[Progress], Any]
     ) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from builders.sent_files import six_axis_urdf
 from nrdf.errors import RobotError
 from nrdf.robot.model.arm import BUNDLED, load_arm
 
@@ -28,25 +29,8 @@ def test_an_arm_of_too_few_axes():
 
 
 def test_a_urdf_keeps_its_speed_limits_and_says_which_meshes_are_missing(tmp_path):
-    links = "".join(
-        f'<link name="l{i}"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" '
-        f'ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 .1"/><geometry>'
-        + (
-            '<mesh filename="package://x/y.stl"/>'
-            if i == 3
-            else '<cylinder radius=".03" length=".2"/>'
-        )
-        + "</geometry></collision></link>"
-        for i in range(7)
-    )
-    joints = "".join(
-        f'<joint name="j{i}" type="revolute"><parent link="l{i}"/><child link="l{i + 1}"/>'
-        f'<origin xyz="0 0 .2"/><axis xyz="{"0 0 1" if i % 2 else "0 1 0"}"/>'
-        f'<limit lower="-2" upper="2" velocity="1.5" effort="50"/></joint>'
-        for i in range(6)
-    )
     file = tmp_path / "arm.urdf"
-    file.write_text(f'<robot name="six">{links}{joints}</robot>')
+    file.write_text(six_axis_urdf())
     arm = load_arm(file)
     assert arm.joint_names == tuple(f"j{i}" for i in range(6))
     np.testing.assert_allclose(arm.chain.speeds, 1.5)

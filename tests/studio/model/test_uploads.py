@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import errno
-import io
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from builders.sent_files import archive
 from builders.studio_page import small_box
 from nrdf.errors import CloudError, OutputError, ProcessError
 from nrdf.io.cloud import PointCloud, write_cloud
@@ -83,27 +82,18 @@ def test_a_dense_reference_is_thinned_as_the_model_does():
     assert len(thinned_reference(dense)) == 16_384
 
 
-def archive(**files):
-    """A ZIP archive."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as made:
-        for name, content in files.items():
-            made.writestr(name, content)
-    return buffer.getvalue()
-
-
 @pytest.mark.parametrize(
     ("content", "said"),
     [
         (b"PK no archive", "k.zip is no ZIP archive that can be read; give knowledge.zip"),
-        (archive(**{"a/box.ply": "ply"}), "k.zip holds 0 knowledge files"),
-        (archive(**{"a.yaml": "", "b/c.yml": ""}), "k.zip holds 2 knowledge files"),
-        (archive(**{"a/x.yaml": "", "b/x.yaml": ""}), "x.yaml' is no name that is taken"),
-        (archive(**{"con\n.yaml": ""}), "is no name that is taken"),
-        (archive(**{"x.yaml": "category: 3"}), "^x.yaml"),
-        (archive(**{str(i): "" for i in range(601)}), "holds 601 files; at most 600"),
-        (archive(**{"x.yaml": bytes(LARGEST_UPLOAD + 1)}), "at most 600 of together 128 MiB"),
-        (archive(**{"x.yaml": "a" * 5000})[:-2000], "no ZIP archive"),
+        (archive({"a/box.ply": "ply"}), "k.zip holds 0 knowledge files"),
+        (archive({"a.yaml": "", "b/c.yml": ""}), "k.zip holds 2 knowledge files"),
+        (archive({"a/x.yaml": "", "b/x.yaml": ""}), "x.yaml' is no name that is taken"),
+        (archive({"con\n.yaml": ""}), "is no name that is taken"),
+        (archive({"x.yaml": "category: 3"}), "^x.yaml"),
+        (archive({str(i): "" for i in range(601)}), "holds 601 files; at most 600"),
+        (archive({"x.yaml": bytes(LARGEST_UPLOAD + 1)}), "at most 600 of together 128 MiB"),
+        (archive({"x.yaml": "a" * 5000})[:-2000], "no ZIP archive"),
     ],
 )  # fmt: skip
 def test_archives_that_hold_no_knowledge_are_refused(content, said):
@@ -117,6 +107,6 @@ def test_a_full_disk_is_said_to_be_one(monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(OutputError, match="No space left on device; free some space"):
-        read_knowledge_zip("k.zip", archive(**{"a.yaml": "x"}))
+        read_knowledge_zip("k.zip", archive({"a.yaml": "x"}))
     with pytest.raises(OutputError, match="No space left on device; free some space"):
         read_sent("a.ply", b"ply")

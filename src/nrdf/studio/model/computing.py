@@ -25,6 +25,7 @@ from nrdf.process.check import check_process
 from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
+from nrdf.studio.model.cell_upload import store_cell
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
 from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
 from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
@@ -108,6 +109,11 @@ class LocalComputing:
         """`nrdf.studio.model.uploads.read_knowledge_zip`."""
         progress(0, 1)
         return read_knowledge_zip(name, content)
+
+    def store_cell(self, name: str, content: bytes, place: Path, progress: Progress) -> Path:
+        """`nrdf.studio.model.cell_upload.store_cell`."""
+        progress(0, 1)
+        return store_cell(name, content, place)
 
     def read_scan(
         self, name: str, content: bytes, model: str, reference: PointCloud, unit: str | None,

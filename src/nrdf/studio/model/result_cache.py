@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer_result import TransferResult
+from nrdf.studio.model.cell_upload import CELL
 from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
@@ -24,6 +26,7 @@ from nrdf.studio.model.computing import (
 from nrdf.studio.model.document import REFERENCE, Document, LoadedObject, PaintedRegion, Target
 from nrdf.studio.model.editor import Editor
 from nrdf.studio.model.placing import PlacedScan
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.worker import Progress
 
 
@@ -73,6 +76,12 @@ class ResultCache:
             "read_knowledge", name, content, progress=progress
         )
         return bound
+
+    def store_cell(self, name: str, content: bytes, progress: Progress) -> StudioCell:
+        """Keep a cell file that a browser sent with the session, as of `store_cell`."""
+        place = self.editor.session.folder / CELL
+        file: Path = self._computing.call("store_cell", name, content, place, progress=progress)
+        return StudioCell.of(file)
 
     def read_scan(
         self, name: str, content: bytes, document: Document, unit: str | None, progress: Progress

@@ -26,7 +26,8 @@ ENDINGS = (
 )  # fmt: skip
 BUNDLED = (REFERENCE, *TARGETS)
 _LONGEST_NAME = 60
-_MOST_FILES = 600
+_MOST_FILES, _DEEPEST = 600, 8
+YAML = (".yaml", ".yml")
 
 
 def read_upload(name: str, content: bytes, category: str, unit: str | None = None) -> PointCloud:
@@ -67,17 +68,11 @@ def read_knowledge_zip(name: str, content: bytes) -> BoundKnowledge:
     OutputError where the disk is full, and what
     `nrdf.process.bound_knowledge.read_bound_knowledge` raises.
     """
-    shown = shown_name(name)
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            with zipfile.ZipFile(io.BytesIO(content)) as archive:
-                _unpack(archive, Path(folder), shown)
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError):
-            raise ProcessError(
-                f"{shown} is no ZIP archive that can be read; give knowledge.zip of step 5, or one "
-                "made of a knowledge file and the files that it names"
-            ) from None
-        found = [path for path in Path(folder).iterdir() if path.suffix in (".yaml", ".yml")]
+    with tempfile.TemporaryDirectory() as kept:
+        folder, shown = Path(kept), shown_name(name)
+        unpack(name, content, folder, "give knowledge.zip of step 5, or one made of a knowledge "
+               "file and the files that it names", flat=True)  # fmt: skip
+        found = [path for path in folder.iterdir() if path.suffix in YAML]
         if len(found) != 1:
             raise ProcessError(f"{shown} holds {len(found)} knowledge files (.yaml); give one")
         try:
@@ -86,22 +81,46 @@ def read_knowledge_zip(name: str, content: bytes) -> BoundKnowledge:
             raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
 
-def _unpack(archive: zipfile.ZipFile, folder: Path, shown: str) -> None:
-    """Write an archive's files, by the last part of their names, into a folder."""
-    members = [member for member in archive.infolist() if not member.is_dir()]
+def unpack(name: str, content: bytes, folder: Path, wanted: str, flat: bool) -> None:
+    """Write the files of a ZIP archive that a browser sent into a folder; flat: by the last parts
+    of their names alone, else in the archive's folders, which stay inside.
+
+    Raises ProcessError, which says what is `wanted`, for what is no such archive, holds too much
+    or names that are not taken, and OutputError where the disk is full.
+    """
+    shown = shown_name(name)
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            _unpack(archive, folder, shown, flat)
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError):
+        raise ProcessError(f"{shown} is no ZIP archive that can be read; {wanted}") from None
+
+
+def _unpack(archive: zipfile.ZipFile, folder: Path, shown: str, flat: bool) -> None:
+    members = [m for m in archive.infolist() if not (m.is_dir() or _of_macos(m.filename))]
     if len(members) > _MOST_FILES or sum(m.file_size for m in members) > LARGEST_UPLOAD:
         raise ProcessError(
             f"{shown} holds {len(members)} files; at most {_MOST_FILES} of together "
             f"{LARGEST_UPLOAD >> 20} MiB are taken"
         )
     for member in members:
-        file = PurePath(member.filename.replace("\\", "/")).name
-        if safe_file_name(file, "") != file or (folder / file).exists():
-            raise ProcessError(f"{shown}: '{shown_name(file)}' is no name that is taken, or twice")
+        parts = PurePath(member.filename.replace("\\", "/")).parts
+        parts = parts[-1:] if flat else parts
+        path = folder.joinpath(*parts)
+        safe = 0 < len(parts) <= _DEEPEST and all(safe_file_name(p, "") == p for p in parts)
+        if not safe or path.exists():
+            named = shown_name(member.filename)
+            raise ProcessError(f"{shown}: '{named}' is no name that is taken, or twice")
         with archive.open(member) as sent:  # no more than its size says
             whole = sent.read(member.file_size)
-        with output_errors(folder / file):
-            (folder / file).write_bytes(whole)
+        with output_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(whole)
+
+
+def _of_macos(name: str) -> bool:
+    """Whether a file is one that macOS adds to archives."""
+    return name.startswith("__MACOSX/") or PurePath(name).name == ".DS_Store"
 
 
 def check_upload(name: str, size: int) -> str:

@@ -167,6 +167,26 @@
   };
   lasso.onwheel = (event) => canvas().dispatchEvent(new WheelEvent("wheel", event));
 
+  // A file that is dropped anywhere goes to the upload of the open tab that takes its kind.
+  addEventListener("dragover", (event) => {
+    if (event.dataTransfer?.types.includes("Files")) event.preventDefault();
+  });
+  addEventListener("drop", (event) => {
+    const { files } = event.dataTransfer ?? {};
+    if (!files?.length) return;
+    event.preventDefault();
+    if (looking()) return;
+    const open = [...document.querySelectorAll("input[type=file]")]
+      .filter((input) => input.nextElementSibling?.offsetParent);
+    const ending = "." + files[0].name.split(".").pop().toLowerCase();
+    const to = open.find((input) => input.accept.split(",").includes(ending)) ?? open[0];
+    tip.hidden = Boolean(to);
+    tip.textContent = "Drop files while 1 Reference, 4 Targets or 6 Robot is open";
+    if (!to) return;
+    to.files = files;
+    to.dispatchEvent(new Event("change", { bubbles: true }));
+  });
+
   // Who looks on changes nothing, not even on their own page.
   for (const kind of ["pointerdown", "mousedown", "click", "keydown"])
     addEventListener(kind, (event) => {

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from nrdf.studio.arm_simulation import ArmSimulation
 from nrdf.studio.context import StudioContext
+from nrdf.studio.model.cell_upload import CELL, ENDINGS
+from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.panels.inputs import Inputs
 from nrdf.studio.panels.save import NO_TARGET, transferred_targets
 
@@ -40,6 +44,12 @@ class RobotTab:
             "Simulate the job on a robot arm: what it reaches, where it would collide, and the "
             "contact force."
         )
+        self.cell = gui.add_markdown("")
+        self.upload = gui.add_upload_button(
+            "Cell file …", mime_type=",".join(ENDINGS), color="gray",
+            hint="A cell file, or a ZIP of it with the robot's URDF or MJCF and its meshes.",
+        )  # fmt: skip
+        self.without = gui.add_button("Without the cell file", color="gray", visible=False)
         self.target = gui.add_dropdown("Target", (NO_TARGET,))
         self.simulate = gui.add_button("Simulate on the arm", color="green")
         self.play = gui.add_button("Play", disabled=True)
@@ -52,6 +62,8 @@ class RobotTab:
         self.save = gui.add_button("Save the simulation")
         self.saved = gui.add_markdown("")
         self.status = gui.add_markdown("")
+        inputs.on(self.upload.on_upload, lambda event: context.read_cell(event.value, self._take))
+        inputs.on(self.without.on_click, lambda _: self._take(StudioCell()))
         inputs.on(self.simulate.on_click, lambda _: simulation.start(self.target.value))
         inputs.on(self.play.on_click, lambda _: self._play())
         inputs.on(self.time.on_update, lambda event: self._seek(float(event.value)))
@@ -62,7 +74,9 @@ class RobotTab:
 
     def refresh(self) -> None:
         """Show the targets, and the simulation."""
-        simulation = self.simulation
+        simulation, cell = self.simulation, self.context.cell
+        self.cell.content = f"Simulations and programs are for {cell.words}."
+        self.without.visible = cell.described is not None
         self.inputs.set_options(self.target, transferred_targets(self.context))
         playback = simulation.playback
         self.play.disabled = self.time.disabled = self.save.disabled = playback is None
@@ -101,13 +115,19 @@ class RobotTab:
         if self.now.content != text:
             self.now.content = text
 
+    def _take(self, cell: StudioCell) -> None:
+        """Another cell: what was simulated in the one before is put away."""
+        if cell.described is None:
+            shutil.rmtree(self.context.editor.session.folder / CELL, ignore_errors=True)
+        given = self.context.cell  # an arm of the command line is that without a cell file
+        self.context.cell = replace(cell, robot=given.robot, tool_frame=given.tool_frame)
+        self.simulation.clear()
+        self.context.arrange()
+        self.refresh()
+
     def _play(self) -> None:
-        player = self.simulation.player
-        if player.playing:
-            player.pause()
-        else:
-            player.speed = _factor(self.speed.value)
-            self.simulation.play()
+        self.simulation.player.speed = _factor(self.speed.value)
+        self.simulation.play_or_pause()
         self.refresh()
 
     def _seek(self, time_s: float) -> None:
