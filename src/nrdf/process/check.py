@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,11 +65,16 @@ def check_knowledge(
 
 
 def check_process(
-    region: RegionMesh, name: str, process: Process, given: GivenSurface | None = None
+    region: RegionMesh,
+    name: str,
+    process: Process,
+    given: GivenSurface | None = None,
+    rough: bool = False,
 ) -> CheckedProcess:
     """One process planned and measured on a region of the reference's mesh.
 
-    given: the object as the user gave it, which the tool path is measured against.
+    given: the object as the user gave it, which the tool path is measured against. rough: for a
+    first look, as of `Strategy` and `plan_result`.
     """
     warnings = []
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
@@ -81,7 +86,7 @@ def check_process(
     if process.kind in ("sand", "polish") and process.force_n is None:
         warnings.append(f"{process.kind} without force_n: the robot holds a position, not a force")
     try:
-        strategy = strategy_of(process)
+        strategy = replace(strategy_of(process), rough=rough)
         if process.waypoints is None:
             _check_spacing(region, process)
             check_origin(process, region.parent)
@@ -90,7 +95,7 @@ def check_process(
             taught = taught_segments(process, region.parent)
             normals = normals_under(region.parent, taught, strategy.tool_radius_m)
             segments = add_approach_retract(taught, normals, strategy)
-        result = plan_result(region, process, segments, process.waypoints is None)
+        result = plan_result(region, process, segments, process.waypoints is None, rough)
         if result is not None:
             segments, strategy = result.segments, result.strategy
         metrics = measure_path(region, strategy, segments, given)

@@ -9,7 +9,7 @@ from nrdf.errors import ProcessError
 from nrdf.process.process import Process
 from nrdf.process.strategy import strategy_of
 from nrdf.process_model.feed_planner import FeedLimits
-from nrdf.process_model.plan import PlannedResult, plan_by_result
+from nrdf.process_model.plan import PlannedResult, first_look, plan_by_result
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import Target
 from nrdf.process_model.result_model import Tool
@@ -44,22 +44,27 @@ def result_settings(process: Process) -> ResultSettings | None:
 
 
 def plan_result(
-    region: RegionMesh, process: Process, taught: Sequence[Segment], replan: bool
+    region: RegionMesh,
+    process: Process,
+    taught: Sequence[Segment],
+    replan: bool,
+    rough: bool = False,
 ) -> PlannedResult | None:
     """The path of a process planned by its target; None where it has none.
 
-    taught: its path at one feed; replan: whether other lines may be taken. Raises ProcessError
-    where the target is out of reach.
+    taught: its path at one feed; replan: whether other lines may be taken; rough: neither lines nor
+    feeds are planned, `nrdf.process_model.plan.first_look`. Raises ProcessError where the target is
+    out of reach.
     """
     settings = result_settings(process)
     if settings is None:
         return None
     name = "thickness_um" if process.thickness_um else "removal_um"
+    asked = strategy_of(process), settings.tool, settings.target, settings.limits
     try:
-        return plan_by_result(
-            region, taught, strategy_of(process), settings.tool, settings.target, settings.limits,
-            replan,
-        )  # fmt: skip
+        if rough:
+            return first_look(region, taught, *asked)
+        return plan_by_result(region, taught, *asked, replan)
     except ProcessError as error:
         raise ProcessError(f"{name}: {error}") from None
 
@@ -88,13 +93,14 @@ def result_warnings(process: Process, planned: PlannedResult | None) -> list[str
         )
     if settings.most_m is not None:
         model = planned.model
-        over = model.cells.of_region(model.values()) > settings.most_m
+        values = model.values()[model.cells.inside]
+        over = values > settings.most_m
         share = float(model.region_areas_m2[over].sum() / model.region_areas_m2.sum())
         if share > 0.0:
             what = "sanded through" if process.removal_um else "too thick"
             lines.append(
                 f"{share:.2%} of the region is {what}: more than {1e6 * settings.most_m:.4g} µm, "
-                f"up to {1e6 * float(model.cells.of_region(model.values()).max()):.4g} µm"
+                f"up to {1e6 * float(values.max()):.4g} µm"
             )
     return lines
 

@@ -18,7 +18,8 @@ class Cells:
     """Triangles of a surface, small to the tool.
 
     centres: (n, 3), m; normals: (n, 3), outward; areas_m2: (n,). inside: (n,), which are of the
-    region; they come first, in the order of `fine`, the region's own mesh, refined.
+    region; they come first, in the order of `fine`, the region's own mesh, refined. number: where
+    a cell is a patch of several triangles of `fine`, that of each (f,).
     """
 
     centres: np.ndarray
@@ -26,6 +27,17 @@ class Cells:
     areas_m2: np.ndarray
     inside: np.ndarray
     fine: FineMesh
+    number: np.ndarray | None = None
+
+    @staticmethod
+    def rough(region: RegionMesh, size_m: float) -> Cells:
+        """Patches of that size of a region alone, for a first look."""
+        mesh = region.mesh
+        own = FineMesh(mesh.vertices, mesh.faces, np.arange(len(mesh.faces)), size_m)
+        number, nearest = own.patches(size_m)
+        centres, normals, _ = region.on_parent(own.centres[nearest], own.normals[nearest])
+        areas = np.bincount(number, own.areas)
+        return Cells(centres, normals, areas, np.ones(len(areas), bool), own, number)
 
     @staticmethod
     def of(region: RegionMesh, edge_m: float, around_m: float) -> Cells:
@@ -50,8 +62,9 @@ class Cells:
         )
 
     def of_region(self, values: np.ndarray) -> np.ndarray:
-        """The region's share (k,) of values (n,)."""
-        return values[self.inside]
+        """Of values (n,), those of the region's triangles in `fine` (f,)."""
+        own = values[self.inside]
+        return own if self.number is None else own[self.number]
 
 
 def _beside(

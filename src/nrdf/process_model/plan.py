@@ -34,6 +34,7 @@ _STEADY = 1.0  # half-widths over which a gun's axis is averaged: its fan covers
 _STEPOVERS = (1.5, 1.0)
 """Times the stepover of theory that are tried. Lines farther apart are driven slower, which
 leaves the arm more time to change its speed; finer ones are more even."""
+_COARSE = 2.0  # times as long steps along the way for a first look
 _SAME = 0.1  # stepovers that are no farther from each other are one
 _GOOD = 0.98  # share within the tolerance with which no other lines are tried
 
@@ -110,6 +111,25 @@ def plan_by_result(
         made = _driven(taught, strategy, before, feeds, rooms, target, limits, plain)
         best = made if made.metrics.within > best.metrics.within else best
     return best
+
+
+def first_look(
+    region: RegionMesh,
+    lines: Sequence[Segment],
+    strategy: Strategy,
+    tool: Tool,
+    target: Target,
+    limits: FeedLimits,
+) -> PlannedResult:
+    """What lines as they are leave at one feed, the one that gives half of the region the target,
+    in rough cells. Raises ProcessError for a pad that does not turn."""
+    check_reachable_at_all(tool)
+    cells = region.last("rough cells", tool, lambda: cells_for(region, tool, rough=True))
+    model = ResultModel.of(region, lines, tool, cells, _COARSE)
+    feeds = constant_feeds(model, target, limits)
+    model = replace(model, moves=replace(model.moves, feeds_m_s=feeds))
+    metrics = model.measure(target)
+    return PlannedResult(with_feeds(lines, model.moves, feeds), strategy, model, metrics, metrics)
 
 
 def _driven(

@@ -39,13 +39,17 @@ class ResultModel:
 
     @staticmethod
     def of(
-        region: RegionMesh, segments: Sequence[Segment], tool: Tool, cells: Cells | None = None
+        region: RegionMesh,
+        segments: Sequence[Segment],
+        tool: Tool,
+        cells: Cells | None = None,
+        times: float = 1.0,
     ) -> ResultModel:
-        """cells: of the region, where they are known already. Raises ProcessError where the path
-        has no process segment."""
+        """cells: of the region, where they are known already; times: how often as long the steps
+        along the way are. Raises ProcessError where the path has no process segment."""
         cells = cells_for(region, tool) if cells is None else cells
         wide = min(tool.ends_m) if isinstance(tool, SprayProfile) else tool.radius_m
-        moves = Moves.of(segments, wide / _STEP)
+        moves = Moves.of(segments, times * wide / _STEP)
         count, stops = len(moves.lengths_m), len(moves.stops.weights)
         if isinstance(tool, SprayProfile):
             blocking = region.parent
@@ -105,12 +109,15 @@ class ResultModel:
         )
 
 
-def cells_for(region: RegionMesh, tool: Tool) -> Cells:
-    """Cells that are small to a tool, of a region and what lies around it."""
+def cells_for(region: RegionMesh, tool: Tool, rough: bool = False) -> Cells:
+    """Cells that are small to a tool, of a region and what lies around it; rough: for a first look,
+    of the region alone."""
     if isinstance(tool, SprayProfile):
         small, large = min(tool.ends_m), max(tool.ends_m)
     else:
         small = large = tool.radius_m
+    if rough:
+        return Cells.rough(region, small / _CELL)
     return Cells.of(region, small / _CELL, _AROUND * large)
 
 

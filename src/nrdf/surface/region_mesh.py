@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from threading import RLock
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from nrdf.surface.region_pieces import Pieces
 from nrdf.surface.smooth_normals import SmoothNormals
 from nrdf.surface.target_mesh import TargetMesh
 
+Made = TypeVar("Made")
 _WORTH = 0.1  # footprints, an area that is worth a word
 _SAME = 1e-6  # of the object's size: how near to the object's mesh a region's places are on it
 _OFF, _TIMES = 0.99, 2.0
@@ -56,6 +57,14 @@ class RegionMesh:
     def memo(self) -> dict[Hashable, Any]:
         """What was worked out of the region before, by all that it depends on."""
         return {}
+
+    def last(self, name: str, key: Hashable, make: Callable[[], Made]) -> Made:
+        """What was made last under a name, where that was for the same key; else made now."""
+        kept = self.memo.get(name)
+        if kept is None or kept[0] != key:
+            kept = self.memo[name] = key, make()
+        made: Made = kept[1]
+        return made
 
     def on_parent(
         self, points: np.ndarray, normals: np.ndarray

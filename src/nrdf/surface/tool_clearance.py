@@ -68,7 +68,8 @@ def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: flo
     def free(points: np.ndarray, outward: np.ndarray) -> np.ndarray:
         return has_clearance(region.parent, points, outward, clearance_m)
 
-    found = region_where(region, free, tool_radius_m)
+    key = clearance_m, tool_radius_m
+    found = region.last("accessible", key, lambda: region_where(region, free, tool_radius_m))
     if found is None:
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "

@@ -36,6 +36,11 @@ class ClosedBorder:
     @staticmethod
     def of(region: RegionMesh, tool_radius_m: float) -> ClosedBorder:
         """Discs about the border of a region, in planes that touch it there."""
+        make = ClosedBorder._of
+        return region.last("closed border", tool_radius_m, lambda: make(region, tool_radius_m))
+
+    @staticmethod
+    def _of(region: RegionMesh, tool_radius_m: float) -> ClosedBorder:
         mesh, radius = region.mesh, tool_radius_m
         border, along, faces = _places(mesh, radius / _PER_RADIUS)
         if not len(border):

@@ -35,7 +35,7 @@ class ToolPathMetrics:
     coverage, left_out, unreached: shares of the whole region that was found, as a `Coverage` has
     them; overlap: share of what is worked that is reached more than once in a pass;
     line_spacing_*: between neighbouring lines, along the surface; None where no line has a
-    neighbour.
+    neighbour, and at a first look.
 
     surface_distance_*: of the process waypoints from the mesh that they were planned on, at the
     stand-off asked for, the worst and the 99th percentile. true_distance_*: of the places on the
@@ -108,7 +108,9 @@ def measure_path(
     )
     counts = sampled.coverage_count(samples.points, samples.normals, strategy.tool_radius_m)
     worked = counts[(counts > 0) & samples.accessible]
-    spacing = line_spacing(region.mesh, sampled, strategy.stepover_m)
+    spacing = np.zeros(0)
+    if not strategy.rough:
+        spacing = line_spacing(region.mesh, sampled, strategy.stepover_m)
     off, wrong = _fit(region, strategy, work, contacts)
     step, turn, bend = _jumps(work, contacts, axes)
     process, between, time = _driven(segments, strategy.approach_feed_m_s)

@@ -94,9 +94,11 @@ def even_field(mesh: FineMesh, wanted: np.ndarray, rounds: int) -> np.ndarray:
 
     Its mean is 0.
     """
-    # A little mass keeps the matrix, which knows no constant, regular.
-    small = 1e-9 / max(float(mesh.areas.sum()), 1e-300)
-    solver = factor(csc_matrix(mesh.stiffness + diags(small * mesh.mass)))
+    if "poisson" not in mesh.memo:
+        # A little mass keeps the matrix, which knows no constant, regular.
+        small = 1e-9 / max(float(mesh.areas.sum()), 1e-300)
+        mesh.memo["poisson"] = factor(csc_matrix(mesh.stiffness + diags(small * mesh.mass)))
+    solver = mesh.memo["poisson"]
     values = np.zeros(len(mesh.vertices))
     for _ in range(rounds):
         values = solver.solve(mesh.divergence(wanted))

@@ -105,11 +105,16 @@ class Part:
 def parts_of(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> list[Part]:
     """The parts of a region that are worth a line, the largest first, in triangles with edges of so
     many stepovers."""
-    meshes = refined(region, strategy, edge).components()
-    least = SPECK * np.pi * strategy.tool_radius_m**2
-    chosen = [m for m in meshes if float(m.areas.sum()) >= least] or meshes[:1]
-    closed = closed_border(region, strategy)
-    return [Part(mesh, closed=closed) for mesh in chosen]
+    radius, margin = strategy.tool_radius_m, strategy.edge_margin_m > 0.0
+
+    def made() -> list[Part]:
+        meshes = refined(region, strategy, edge).components()
+        least = SPECK * np.pi * radius**2
+        chosen = [m for m in meshes if float(m.areas.sum()) >= least] or meshes[:1]
+        closed = closed_border(region, strategy)
+        return [Part(mesh, closed=closed) for mesh in chosen]
+
+    return region.last("parts", (_edge_m(strategy, edge), radius, margin), made)
 
 
 def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None:
@@ -121,7 +126,14 @@ def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None
 
 def refined(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> FineMesh:
     """A region in triangles that are fine enough for the stepover, with edges of so many."""
-    return refine(region.mesh.vertices, region.mesh.faces, edge * strategy.stepover_m)
+    return refine(region.mesh.vertices, region.mesh.faces, _edge_m(strategy, edge))
+
+
+def _edge_m(strategy: Strategy, edge: float) -> float:
+    """The longest edge of a region's triangles: so many stepovers or, for a first look, up to
+    twice that."""
+    longest = edge * strategy.stepover_m
+    return float(2.0 ** np.ceil(np.log2(longest))) if strategy.rough else longest
 
 
 def even_levels(

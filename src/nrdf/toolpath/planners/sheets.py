@@ -13,7 +13,6 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from nrdf.geometry.frames import SIDES
 from nrdf.surface.fine_mesh import FineMesh
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
@@ -81,20 +80,15 @@ def pieces_of(part: Part, chosen: np.ndarray) -> list[Part]:
 def felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndarray:
     """The smooth normal (f, 3) that a tool feels on each triangle, nearly: one for all triangles
     of a cell that is a fraction of the tool and look to one side."""
-    cell = np.floor((mesh.centres - mesh.centres.min(axis=0)) * (_PER_RADIUS / radius_m))
-    side = (mesh.normals @ SIDES.T).argmax(axis=1)
-    cell = cell.astype(np.int64)
-    count = cell.max(axis=0) + 1
-    key = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(SIDES) + side
-    _, number = np.unique(key, return_inverse=True)
-    number = number.reshape(-1)
-    total = np.maximum(np.bincount(number, mesh.areas), 1e-300)
-    centre = np.stack(
-        [np.bincount(number, mesh.areas * mesh.centres[:, a]) / total for a in range(3)], axis=1
-    )
-    away = ((mesh.centres - centre[number]) ** 2).sum(axis=1)
-    order = np.lexsort([away, number])
-    nearest = order[np.unique(number[order], return_index=True)[1]]
+    key = ("felt normals", id(region), radius_m)
+    if key not in mesh.memo:
+        mesh.memo[key] = _felt_normals(region, mesh, radius_m)
+    felt: np.ndarray = mesh.memo[key]
+    return felt
+
+
+def _felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndarray:
+    number, nearest = mesh.patches(radius_m / _PER_RADIUS)
     felt = region.mesh.smooth_normals(mesh.centres[nearest], mesh.origin[nearest], radius_m)
     return np.asarray(felt[number])
 
