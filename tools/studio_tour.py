@@ -6,7 +6,8 @@ has never seen, with what is clicked counted and what is waited for timed.
 Fails where a path needs more than 25 clicks or 90 s of waiting, on an error in the browser's
 console, or on a serious finding of axe-core. Leaves pictures, a film and figures in
 build/studio-tour/. The scans: ../shared/scans/chair-2.off where that is, and a dense one of a chair
-of an IKEA catalogue, or of a made-up chair, that lies in some pose in millimetres.
+of an IKEA catalogue, or of a made-up chair, that lies in some pose: half a million points, in
+millimetres.
 """
 
 from __future__ import annotations
@@ -22,16 +23,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
-from scipy.spatial.transform import Rotation
-
-from nrdf.geometry.similarity import Similarity
-from nrdf.io.cloud import PointCloud, write_cloud
-from nrdf.scans.simulate import ScanSettings, simulate_scan
-from nrdf.shapes.families import get_family
+from studio_speed import lying_scan
 
 ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"
@@ -117,28 +112,6 @@ class Tour:
             if found["impact"] in ("serious", "critical"):
                 places = "; ".join(node["html"][:100] for node in found["nodes"][:3])
                 self.findings.append(f"{where}: {found['id']} ({found['impact']}): {places}")
-
-
-def lying_scan(folder: Path) -> Path:
-    """A dense scan, in millimetres, of a chair that lies in some pose on a floor."""
-    kept = SHARED / "objects" / "ikea" / "chair" / "jokkmokk.npz"
-    if kept.is_file():
-        held = np.load(kept)
-        vertices, faces = held["vertices"].astype(float), held["faces"]
-    else:
-        made = get_family("chair").member(5).mesh()
-        vertices, faces = made.vertices, made.faces
-    turn = Rotation.from_euler("xyz", (100, 25, 40), degrees=True).as_matrix()
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    scale = 850.0 / float((high - low).max())
-    scan = simulate_scan(
-        vertices, faces, ScanSettings(views=6, pixels=420, noise=0.0005),
-        np.random.default_rng(0), Similarity(turn, np.array([300.0, -200.0, 900.0]), scale), "mm",
-    )  # fmt: skip
-    path = folder / "dense-chair.ply"
-    write_cloud(path, PointCloud(scan.cloud.points, scan.normals, unit="mm"))
-    print(f"a scan of {len(scan.cloud)} points, {path.stat().st_size / 1e6:.1f} MB")
-    return path
 
 
 def teach(tour: Tour) -> None:

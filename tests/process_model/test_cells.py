@@ -51,3 +51,12 @@ def test_a_region_of_another_mesh_of_the_object_lies_on_the_object_given():
         for one in (region, exact)
     )
     assert film == pytest.approx(wanted)
+
+
+def test_rough_cells_are_few_and_every_triangle_has_the_value_of_one():
+    whole = plate(0.4, 0.2, 0.005)
+    cells = Cells.rough(RegionMesh.from_faces(whole, np.ones(len(whole.faces), bool)), 0.02)
+    assert cells.inside.all() and cells.areas_m2.sum() == pytest.approx(0.08)
+    assert len(cells.areas_m2) < len(whole.faces) / 20
+    across = cells.of_region(cells.centres[:, 0])
+    np.testing.assert_allclose(across, cells.fine.centres[:, 0], atol=0.02)

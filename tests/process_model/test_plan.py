@@ -10,7 +10,7 @@ import pytest
 from nrdf.errors import ProcessError
 from nrdf.process_model.cells import plate
 from nrdf.process_model.feed_planner import FeedLimits
-from nrdf.process_model.plan import feeds_for, plan_by_result, strategies_for
+from nrdf.process_model.plan import feeds_for, first_look, plan_by_result, strategies_for
 from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import Target
@@ -91,6 +91,16 @@ def test_lines_are_chosen_by_what_they_leave(region):
     made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, limits)
     assert made.strategy.stepover_m == max(within, key=within.__getitem__)
     assert made.metrics.within == pytest.approx(max(within.values()))
+
+
+def test_a_first_look_is_near_the_same_at_one_feed_in_few_cells(region):
+    taught, limits = plan_on_mesh(region, TAUGHT), FeedLimits()
+    look = first_look(region, taught, TAUGHT, GUN, TARGET, limits)
+    whole = plan_by_result(region, taught, TAUGHT, GUN, TARGET, limits).taught
+    assert look.metrics.within == pytest.approx(whole.within, abs=0.1)
+    cells = look.model.cells
+    assert len(cells.of_region(look.model.values())) == len(cells.fine.faces)
+    assert first_look(region, taught, TAUGHT, GUN, TARGET, limits).model.cells is cells, "kept"
 
 
 def test_what_is_taught_is_never_made_worse():

@@ -1,6 +1,6 @@
 """The studio in a real browser: all steps, as a person takes them by what the page says.
 
-Screenshots of every step are left in build/studio/.
+A screenshot of its end is left in build/studio/; `make studio-tour` makes pictures of all steps.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ pytest.importorskip("playwright", reason="pip install playwright")
 from playwright import sync_api
 
 import nrdf
+from builders.cells import cell_of
 from nrdf.bundled import bundled_chair
+from nrdf.cell.file import write_cell
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.studio.app import Studio
 from nrdf.studio.model.computing import ChildProcessComputing
@@ -67,7 +69,7 @@ class Person:
     """Does what the page says, by labels; `studio` is only looked at."""
 
     def __init__(self, page, studio: Studio) -> None:
-        self.page, self.studio, self.shots = page, studio, 0
+        self.page, self.studio = page, studio
         self.notes: list[tuple[str, str]] = []
         notify = studio.notify
 
@@ -167,10 +169,6 @@ class Person:
             with contextlib.suppress(sync_api.Error):
                 notes.first.click(timeout=5e3)
 
-    def shoot(self, name: str) -> None:
-        self.shots += 1
-        self.page.screenshot(path=SHOTS / f"{self.shots}-{name}.png", timeout=60e3)
-
     def planned(self, region: str) -> bool:
         painted = self.studio.editor.document.region(region)
         plan = None if painted is None else self.studio.results.plan(painted, 0)
@@ -181,6 +179,7 @@ class Person:
 def studio(tmp_path):
     server = open_server("127.0.0.1", 8480)
     computing = ChildProcessComputing(nrdf.load_model)
+    computing.start()
     made = Studio(Session(tmp_path / "session"), server, computing, ["chair"], {})
     yield made
     made.stop()
@@ -192,7 +191,7 @@ def person(studio):
     SHOTS.mkdir(parents=True, exist_ok=True)
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path(), args=list(FLAGS))
-        page = browser.new_page(viewport={"width": 1000, "height": 600}, accept_downloads=True)
+        page = browser.new_page(viewport={"width": 900, "height": 520}, accept_downloads=True)
         page.set_default_timeout(1e3 * PATIENCE_S)
         page.add_init_script(SELDOM)
         page.goto(f"http://127.0.0.1:{studio.server.get_port()}")
@@ -253,18 +252,26 @@ def test_all_steps(person, studio, tmp_path):
     until(lambda: size() < brushed, "undoing")
     person.press("Redo")
     until(lambda: size() >= brushed, "redoing")
-    person.shoot("regions")
 
     # 3: another process on each, drawn at once; a wrong value is answered by field and value.
     person.step("3 Process")
     person.choose("Process", "polish")
     person.choose("Pattern", "spiral")
     until(lambda: person.planned("back") and person.planned("seat"), "the plans")
-    person.write("Feed, mm/s", "-5")
-    person.reads("feed_m_s")
+    person.write("Tool radius, mm", "-5")
+    person.reads("radius_m")
     person.reads("-0.005")
-    person.write("Feed, mm/s", "80")
+    person.write("Tool radius, mm", "25")
     person.choose("Region", "seat")
+    # A number that is dragged has a first look, and the plan follows.
+    looks = []
+    look = studio.results.look
+    studio.results.look = lambda *asked: (looks.append(asked), look(*asked))
+    slider = page.get_by_role("slider", name="Stepover, mm")
+    slider.focus()
+    for _ in range(4):
+        slider.press("ArrowLeft")
+    until(lambda: looks and person.planned("seat"), "a first look, and the plan after it")
     person.take("Direction")
     behind = editor.paintable(REFERENCE).points[seat] + [-0.12, 0.0, 0.0]
     behind = int(np.argmin(np.linalg.norm(editor.paintable(REFERENCE).points - behind, axis=1)))
@@ -275,7 +282,6 @@ def test_all_steps(person, studio, tmp_path):
     person.drag_on(REFERENCE, behind, seat, lambda: along() > 0.9)
     until(lambda: person.planned("back") and person.planned("seat"), "the plans")
     person.reads("% missed")
-    person.shoot("process")
 
     # 4: both on another chair; similarity; a uncertain region is painted by hand.
     person.step("4 Targets")
@@ -288,7 +294,6 @@ def test_all_steps(person, studio, tmp_path):
     assert there["seat"][found.regions["seat"].match.indices].mean() > 0.8
     assert all(step.path is not None for step in found.paths)
     person.reads("2 tool paths")
-    person.shoot("target")
     person.take("Similarity")
     person.click_on(REFERENCE, seat, lambda: studio.colouring == "similarity")
     before = studio.descriptor_distances("ladder-back")
@@ -296,8 +301,6 @@ def test_all_steps(person, studio, tmp_path):
         REFERENCE, seat, back, lambda: (studio.descriptor_distances("ladder-back") != before).any()
     )
     sync_api.expect(person.field("Colours")).to_have_value("similarity")
-    time.sleep(1.0)  # for the picture alone
-    person.shoot("similarity")
     person.take("Grow")
     there = middle_of("ladder-back", "seat")
     person.click_on("ladder-back", there, lambda: editor.target("ladder-back").corrected)
@@ -322,7 +325,6 @@ def test_all_steps(person, studio, tmp_path):
     assert b"<table>" in Path(report.value.path()).read_bytes()
     job = read_toolpaths(editor.session.folder / "saved" / "ladder-back" / "job")
     assert {path.process for path in job.paths} == {"sand", "polish"}
-    person.shoot("saved")
 
     # 6: what is left of it, on an arm: simulated beside the page, played, moved by hand, put away.
     if find_spec("mujoco") is not None:
@@ -352,8 +354,6 @@ def test_all_steps(person, studio, tmp_path):
             lambda: abs(studio.arm_simulation.time_s - work[len(work) // 2]) < 0.2, "moving by hand"
         )
         person.reads("· process · line")
-        time.sleep(1.0)  # for the picture alone
-        person.shoot("arm")
         person.press("Simulate on the arm")
         person.press("Cancel")
         until(lambda: not studio.arm_simulation.worker.busy, "cancelling")
@@ -362,6 +362,9 @@ def test_all_steps(person, studio, tmp_path):
         until(
             lambda: studio.visible_objects() == [REFERENCE, "ladder-back"], "putting the arm away"
         )
+        write_cell(tmp_path / "cell.yaml", cell_of())
+        page.locator("input[type=file]").last.set_input_files(tmp_path / "cell.yaml")
+        person.reads("the cell cell 3")
 
     # Nothing is lost: the page, and the program, begun again.
     page.reload()

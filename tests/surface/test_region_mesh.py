@@ -138,3 +138,12 @@ def test_a_region_of_another_mesh_of_the_object_is_put_onto_the_one_given():
     places, normals, same = RegionMesh(low, parent).on_parent(centres, up)
     assert np.abs(places[:, 2]).max() < 1e-9 and np.allclose(normals, up)
     assert 0.002 < same < 0.01
+
+
+def test_what_was_made_last_is_kept_by_its_key_and_serves_a_first_look():
+    target = plate()
+    region = RegionMesh.from_faces(target, np.ones(len(target.faces), bool))
+    made = region.last("x", 1, object)
+    look = region.for_a_look
+    assert look.rough and not region.rough and look.mesh is region.mesh
+    assert look.last("x", 1, object) is made and region.last("x", 2, object) is not made

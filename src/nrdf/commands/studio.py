@@ -76,10 +76,9 @@ def studio(
         errors.print(kept.damage, style="yellow")
     server = open_server(host, port, allow_host)
     origin = {"command": command_line(), "versions": versions()}
-    app = Studio(
-        kept, server, ChildProcessComputing(partial(nrdf.load_model, device=device)), categories,
-        origin, chosen,
-    )  # fmt: skip
+    computing = ChildProcessComputing(partial(nrdf.load_model, device=device))
+    computing.start()
+    app = Studio(kept, server, computing, categories, origin, chosen)
     if not is_loopback(host):
         errors.print(
             f"listening on {host}: everyone who can reach this computer there can see and change "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from nrdf.process.reference_paths import ReferencePaths
 from nrdf.process.result_target import plan_result, result_warnings
 from nrdf.process.strategy import strategy_of
 from nrdf.process.taught_paths import check_origin, normals_under, taught_segments
+from nrdf.process_model.plan import PlannedResult
 from nrdf.surface.given_surface import GivenSurface
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -29,7 +30,7 @@ class CheckedProcess:
     """A process planned on its region of the reference.
 
     fault: why it cannot be done, or "". warnings: what a person should look at. segments and
-    metrics: of its tool path, none where it cannot be done.
+    metrics: of its tool path, none where it cannot be done. result: where one is wanted.
     """
 
     region: str
@@ -38,6 +39,7 @@ class CheckedProcess:
     warnings: tuple[str, ...] = ()
     metrics: ToolPathMetrics | None = None
     segments: tuple[Segment, ...] = ()
+    result: PlannedResult | None = None
 
     @property
     def where(self) -> str:
@@ -65,16 +67,11 @@ def check_knowledge(
 
 
 def check_process(
-    region: RegionMesh,
-    name: str,
-    process: Process,
-    given: GivenSurface | None = None,
-    rough: bool = False,
+    region: RegionMesh, name: str, process: Process, given: GivenSurface | None = None
 ) -> CheckedProcess:
     """One process planned and measured on a region of the reference's mesh.
 
-    given: the object as the user gave it, which the tool path is measured against. rough: for a
-    first look, as of `Strategy` and `plan_result`.
+    given: the object as the user gave it, which the tool path is measured against.
     """
     warnings = []
     stepover, width = process.distance_between_lines_m, 2 * process.tool.radius_m
@@ -86,7 +83,7 @@ def check_process(
     if process.kind in ("sand", "polish") and process.force_n is None:
         warnings.append(f"{process.kind} without force_n: the robot holds a position, not a force")
     try:
-        strategy = replace(strategy_of(process), rough=rough)
+        strategy = strategy_of(process)
         if process.waypoints is None:
             _check_spacing(region, process)
             check_origin(process, region.parent)
@@ -95,14 +92,14 @@ def check_process(
             taught = taught_segments(process, region.parent)
             normals = normals_under(region.parent, taught, strategy.tool_radius_m)
             segments = add_approach_retract(taught, normals, strategy)
-        result = plan_result(region, process, segments, process.waypoints is None, rough)
+        result = plan_result(region, process, segments, process.waypoints is None)
         if result is not None:
             segments, strategy = result.segments, result.strategy
         metrics = measure_path(region, strategy, segments, given)
     except ProcessError as error:
         return CheckedProcess(name, process, str(error), tuple(warnings))
     warnings += path_warnings(process, metrics) + result_warnings(process, result)
-    return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments))
+    return CheckedProcess(name, process, "", tuple(warnings), metrics, tuple(segments), result)
 
 
 def _check_spacing(region: RegionMesh, process: Process) -> None:

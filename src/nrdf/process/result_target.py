@@ -44,17 +44,13 @@ def result_settings(process: Process) -> ResultSettings | None:
 
 
 def plan_result(
-    region: RegionMesh,
-    process: Process,
-    taught: Sequence[Segment],
-    replan: bool,
-    rough: bool = False,
+    region: RegionMesh, process: Process, taught: Sequence[Segment], replan: bool
 ) -> PlannedResult | None:
     """The path of a process planned by its target; None where it has none.
 
-    taught: its path at one feed; replan: whether other lines may be taken; rough: neither lines nor
-    feeds are planned, `nrdf.process_model.plan.first_look`. Raises ProcessError where the target is
-    out of reach.
+    taught: its path at one feed; replan: whether other lines may be taken. For a rough region
+    neither lines nor feeds are planned (`nrdf.process_model.plan.first_look`). Raises ProcessError
+    where the target is out of reach.
     """
     settings = result_settings(process)
     if settings is None:
@@ -62,7 +58,7 @@ def plan_result(
     name = "thickness_um" if process.thickness_um else "removal_um"
     asked = strategy_of(process), settings.tool, settings.target, settings.limits
     try:
-        if rough:
+        if region.rough:
             return first_look(region, taught, *asked)
         return plan_by_result(region, taught, *asked, replan)
     except ProcessError as error:

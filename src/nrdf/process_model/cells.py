@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.surface.fine_mesh import FineMesh, refine
+from nrdf.surface.mesh_patches import patches_of
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 
@@ -34,7 +35,7 @@ class Cells:
         """Patches of that size of a region alone, for a first look."""
         mesh = region.mesh
         own = FineMesh(mesh.vertices, mesh.faces, np.arange(len(mesh.faces)), size_m)
-        number, nearest = own.patches(size_m)
+        number, nearest = patches_of(own, size_m)
         centres, normals, _ = region.on_parent(own.centres[nearest], own.normals[nearest])
         areas = np.bincount(number, own.areas)
         return Cells(centres, normals, areas, np.ones(len(areas), bool), own, number)

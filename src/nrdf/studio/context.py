@@ -10,7 +10,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import viser
@@ -23,12 +23,10 @@ from nrdf.studio.model.computing import (
 )
 from nrdf.studio.model.document import REFERENCE
 from nrdf.studio.model.editor import Editor
-from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.result_cache import ResultCache
 from nrdf.studio.model.session import Session
 from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.model.teaching import ORIGIN
-from nrdf.studio.model.uploads import check_upload, shown_name
 from nrdf.studio.model.worker import Progress, Worker
 from nrdf.studio.pen import Pen
 from nrdf.studio.scene.colours import COLOURINGS, RESULT, similarity_colours
@@ -44,13 +42,9 @@ from nrdf.studio.scene.object_view import ObjectView
 from nrdf.studio.scene.result_map import draw_result
 from nrdf.studio.scene.scene_view import SceneView
 
-if TYPE_CHECKING:
-    from nrdf.io.cloud import PointCloud
-    from nrdf.process.bound_knowledge import BoundKnowledge
-
 log = logging.getLogger(__name__)
 
-_PLAN_AFTER_S = 0.15
+_PLAN_AFTER_S, _PLAN_AFTER_LOOK_S = 0.15, 0.4
 
 
 class StudioContext(ABC):
@@ -86,7 +80,7 @@ class StudioContext(ABC):
         """The one target that is shown beside the reference, None for all."""
         self._distances: dict[str, np.ndarray] = {}
         self._features: CorrespondenceFeatures | None = None
-        self._picked_point = self._uploads = 0
+        self._picked_point = 0
 
     # --- what `nrdf.studio.app.Studio` adds
 
@@ -126,10 +120,7 @@ class StudioContext(ABC):
         """Draw colours, lines, labels and the direction arrow of all objects."""
         with self.lock, self.server.atomic():
             for key, object_view in self.scene.objects.items():
-                self.draw_colours(object_view)
-                by_similarity = self._shows_similarity(object_view)
-                lines = {} if by_similarity else lines_of(self.editor, self.results, key)
-                object_view.draw_lines(lines)
+                self._draw_plans(object_view)
                 object_view.set_label(title_of(self.editor, self.results, key))
                 unsure, removed = doubts_of(self.editor, key)
                 object_view.draw_arrow("front", *(object_view.front if unsure else (None, None)))
@@ -137,6 +128,13 @@ class StudioContext(ABC):
             if REFERENCE in self.scene.objects:
                 ends = direction_of(self.editor, self.region, self.step)
                 self.scene.objects[REFERENCE].draw_arrow("direction", *(ends or (None, None)))
+
+    def _draw_plans(self, object_view: ObjectView) -> None:
+        """Draw the colours and lines of one object."""
+        self.draw_colours(object_view)
+        by_similarity = self._shows_similarity(object_view)
+        lines = {} if by_similarity else lines_of(self.editor, self.results, object_view.key)
+        object_view.draw_lines(lines)
 
     def draw_colours(self, object_view: ObjectView) -> None:
         """Draw the colours of one object."""
@@ -148,8 +146,8 @@ class StudioContext(ABC):
         result = self.results.by_target.get(key)
         made = self.results.surface(key)
         object_view.draw_surface(made if result is None else result.transfer_result.surface)
-        if self.colouring == RESULT and result is not None:
-            return draw_result(object_view, result.transfer_result.paths)
+        if self.colouring == RESULT and (left := self.results.left_on(key)):
+            return draw_result(object_view, left)
         object_view.draw_regions(meshes)
         if by_similarity:
             colours = similarity_colours(self._distances[key], self.similarity_width)
@@ -194,84 +192,45 @@ class StudioContext(ABC):
 
     def plan(self, delay_s: float = _PLAN_AFTER_S) -> None:
         """Plan on the reference what is not planned yet."""
-        document = self.editor.document
-        self._submit("plan", "planning on the reference", delay_s,
-                     lambda progress: self.results.make_plans(document, progress))  # fmt: skip
+        self._plan_in_background(delay_s)
         self.make_surfaces()
         self.refresh_panel()
+
+    def _plan_in_background(self, delay_s: float) -> None:
+        document = self.editor.document
+        self.submit("plan", "planning on the reference", delay_s,
+                     lambda progress: self.results.make_plans(document, progress))  # fmt: skip
+
+    def look(self, region: str, step: int) -> None:
+        """Have a first look at a step that has just been changed, and plan it once that ends.
+
+        A look that has begun is shown, and the newest one follows it.
+        """
+        document = self.editor.document
+
+        def work(progress: Progress) -> None:
+            self.results.look(document, region, step, progress)
+            with self.lock, self.server.atomic():
+                if REFERENCE in self.scene.objects:
+                    self._draw_plans(self.scene.objects[REFERENCE])
+                self.refresh_panel()
+
+        self.worker.submit("look", "a first look", work, replaces=False)
+        self._plan_in_background(_PLAN_AFTER_LOOK_S)
 
     def make_surfaces(self) -> None:
         """Make the surfaces of scans, to be drawn in place of their points."""
         document = self.editor.document
         if not self.results.without_surface(document):
             return
-        self._submit("surfaces", "making surfaces of scans", 0.0,
+        self.submit("surfaces", "making surfaces of scans", 0.0,
                      lambda progress: self.results.make_surfaces(document, progress))  # fmt: skip
 
     def transfer(self, delay_s: float = 0.0) -> None:
         """Transfer the processes to the targets."""
         document = self.editor.document
-        self._submit("transfer", "finding regions and planning tool paths", delay_s,
+        self.submit("transfer", "finding regions and planning tool paths", delay_s,
                      lambda progress: self.results.transfer(document, progress))  # fmt: skip
-
-    def read(
-        self, file: Any, category: str, unit: str | None, then: Callable[[PointCloud], None]
-    ) -> None:
-        """Read a file that a browser sent, and give its cloud to `then`.
-
-        Raises CloudError for a file of another type, or too large a one.
-        """
-        name, content = file.name, file.content
-        check_upload(name, len(content))
-        self._read(f"reading {shown_name(name)}", then,
-                   lambda told: self.results.read(name, content, category, unit, told))  # fmt: skip
-
-    def read_scan(self, file: Any, unit: str | None, then: Callable[[PlacedScan], None]) -> None:
-        """Read a scan that a browser sent, and give it, cleaned and placed, to `then`.
-
-        Raises CloudError for a file of another type, or too large a one.
-        """
-        name, content, document = file.name, file.content, self.editor.document
-        check_upload(name, len(content))
-        what, results = f"reading {shown_name(name)}, and finding how it stands", self.results
-        self._read(what, then, lambda told: results.read_scan(name, content, document, unit, told))
-
-    def read_knowledge(self, file: Any, then: Callable[[BoundKnowledge], None]) -> None:
-        """Read a ZIP archive of knowledge that a browser sent, and give it to `then`."""
-        name, content = file.name, file.content
-        self._read(f"reading {shown_name(name)}", then,
-                   lambda told: self.results.read_knowledge(name, content, told))  # fmt: skip
-
-    def read_cell(self, file: Any, then: Callable[[StudioCell], None]) -> None:
-        """Keep a cell file that a browser sent with the session, and give its cell to `then`."""
-        name, content = file.name, file.content
-        self._read(f"reading {shown_name(name)}", then,
-                   lambda told: self.results.store_cell(name, content, told))  # fmt: skip
-
-    def _read(
-        self, what: str, then: Callable[[Any], None], read: Callable[[Progress], Any]
-    ) -> None:
-        def work(progress: Progress) -> None:
-            made = read(progress)
-            with self.lock:
-                then(made)
-
-        self._uploads += 1  # each is a job of its own
-        self._submit(f"read {self._uploads}", what, 0.0, work)
-
-    def clean_again(
-        self, scan: PointCloud, skipped: Sequence[str], number: int,
-        then: Callable[[PlacedScan], None],
-    ) -> None:  # fmt: skip
-        """Clean and place a scan again in the background, and give it to `then`."""
-        document = self.editor.document
-
-        def work(progress: Progress) -> None:
-            placed = self.results.clean_again(scan, document, skipped, number, progress)
-            with self.lock:
-                then(placed)
-
-        self._submit("clean", "cleaning the scan again", 0.0, work)
 
     def compare(self, key: str, index: int) -> None:
         """Colour every object by the similarity of its points to a shown point of the reference.
@@ -297,12 +256,12 @@ class StudioContext(ABC):
 
         if self._features is not None or not self.worker.has_job("similarity"):
             self._features = None
-            self._submit("similarity", "comparing descriptors", 0.0, work)
+            self.submit("similarity", "comparing descriptors", 0.0, work)
 
-    def _submit(
+    def submit(
         self, kind: str, what: str, delay_s: float, work: Callable[[Progress], None]
     ) -> None:
-        """Work in the background, then show what it has made, however it ended."""
+        """Work in the background, after a delay, then show what it has made, however it ended."""
 
         def work_and_show(progress: Progress) -> None:
             try:

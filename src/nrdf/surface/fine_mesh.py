@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,7 +10,6 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from nrdf.geometry.frames import SIDES
 from nrdf.geometry.mesh import triangle_areas, triangle_crosses
 
 MOST_FACES = 50_000
@@ -81,7 +79,7 @@ class FineMesh:
         return csc_matrix(self.gradient.T @ weight @ self.gradient)
 
     @cached_property
-    def memo(self) -> dict[Hashable, Any]:
+    def memo(self) -> dict[Any, Any]:
         """What was worked out on the mesh before, by all that it depends on."""
         return {}
 
@@ -109,8 +107,7 @@ class FineMesh:
         return np.asarray(self.gradient @ values).reshape(-1, 3)
 
     def divergence(self, field: np.ndarray) -> np.ndarray:
-        """Integrated divergence (v,) of a vector (f, 3) a face: the right side of Poisson's
-        equation for `stiffness`."""
+        """Integrated divergence (v,) of a vector (f, 3) a face, as Poisson's equation has it."""
         return np.asarray(self.gradient.T @ (self.areas[:, None] * field).ravel())
 
     def components(self) -> list[FineMesh]:
@@ -125,20 +122,6 @@ class FineMesh:
         area = np.bincount(of_face, self.areas, minlength=number)
         order = np.argsort(-area, kind="stable")
         return [self.part(of_face == k) for k in order if area[k] > 0.0]
-
-    def patches(self, size_m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Number (f,) of the patch that each face is of: those in a cube of that size that look to
-        one side; and the face (p,) nearest to each patch's centre."""
-        cell = np.floor((self.centres - self.centres.min(axis=0)) / size_m).astype(np.int64)
-        side = (self.normals @ SIDES.T).argmax(axis=1)
-        count = cell.max(axis=0) + 1
-        key = ((cell[:, 0] * count[1] + cell[:, 1]) * count[2] + cell[:, 2]) * len(SIDES) + side
-        number = np.unique(key, return_inverse=True)[1].reshape(-1)
-        total = np.maximum(np.bincount(number, self.areas), 1e-300)
-        sums = [np.bincount(number, self.areas * self.centres[:, a]) for a in range(3)]
-        away = ((self.centres - (np.stack(sums, axis=1) / total[:, None])[number]) ** 2).sum(axis=1)
-        order = np.lexsort([away, number])
-        return number, order[np.unique(number[order], return_index=True)[1]]
 
     def part(self, kept: np.ndarray) -> FineMesh:
         """The faces that are kept (f,) bool."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from threading import RLock
 from typing import Any, TypeVar
@@ -28,17 +28,20 @@ are the object's own: where it was cut from another mesh of the object."""
 @dataclass(frozen=True, eq=False)
 class RegionMesh:
     """mesh: the region's own faces, cut within triangles at its border. parent: the whole object.
-    changes: what was done to the region that was found, in words."""
+    changes: what was done to the region that was found, in words. rough: for a first look: it is
+    planned on in triangles that stay the same while the stepover changes a little, so that what was
+    worked out on them is used again, and not measured in all."""
 
     mesh: TargetMesh
     parent: TargetMesh
     changes: tuple[str, ...] = ()
+    rough: bool = False
     _felt: dict[float, SmoothNormals] = field(default_factory=dict, repr=False)
     _lock: Any = field(default_factory=RLock, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes, as of `TargetMesh`."""
-        return RegionMesh, (self.mesh, self.parent, self.changes)
+        return RegionMesh, (self.mesh, self.parent, self.changes, self.rough)
 
     @staticmethod
     def from_faces(target: TargetMesh, face_mask: np.ndarray) -> RegionMesh:
@@ -58,13 +61,20 @@ class RegionMesh:
         """What was worked out of the region before, by all that it depends on."""
         return {}
 
-    def last(self, name: str, key: Hashable, make: Callable[[], Made]) -> Made:
+    def last(self, name: Hashable, key: Hashable, make: Callable[[], Made]) -> Made:
         """What was made last under a name, where that was for the same key; else made now."""
         kept = self.memo.get(name)
         if kept is None or kept[0] != key:
             kept = self.memo[name] = key, make()
         made: Made = kept[1]
         return made
+
+    @cached_property
+    def for_a_look(self) -> RegionMesh:
+        """The same region, rough; what is worked out of the one serves the other."""
+        rough = replace(self, rough=True)
+        rough.__dict__["memo"] = self.memo
+        return rough
 
     def on_parent(
         self, points: np.ndarray, normals: np.ndarray

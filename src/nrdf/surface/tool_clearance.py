@@ -69,7 +69,9 @@ def accessible_region(region: RegionMesh, clearance_m: float, tool_radius_m: flo
         return has_clearance(region.parent, points, outward, clearance_m)
 
     key = clearance_m, tool_radius_m
-    found = region.last("accessible", key, lambda: region_where(region, free, tool_radius_m))
+    found = region.last(
+        ("accessible", region.rough), key, lambda: region_where(region, free, tool_radius_m)
+    )
     if found is None:
         raise ProcessError(
             f"the tool's clearance_m is {clearance_m:g}, and nowhere in the region are "

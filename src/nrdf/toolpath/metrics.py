@@ -109,7 +109,7 @@ def measure_path(
     counts = sampled.coverage_count(samples.points, samples.normals, strategy.tool_radius_m)
     worked = counts[(counts > 0) & samples.accessible]
     spacing = np.zeros(0)
-    if not strategy.rough:
+    if not region.rough:
         spacing = line_spacing(region.mesh, sampled, strategy.stepover_m)
     off, wrong = _fit(region, strategy, work, contacts)
     step, turn, bend = _jumps(work, contacts, axes)

@@ -76,8 +76,6 @@ class Strategy:
     passes: the lines are driven that often, back and forth. Approach and retract: length of the
     free moves before and after a line, their angle from the normal (0: along the normal; pi/2:
     along the line), and their feed.
-    rough: for a first look: planned in triangles that stay the same while the stepover changes a
-    little, so that what was worked out on them is used again.
     """
 
     trajectory: Trajectory = "raster"
@@ -122,7 +120,6 @@ class Strategy:
     constant_speed: bool = False
     body_radius_m: float = 0.0
     body_length_m: float = 0.0
-    rough: bool = False
 
     def __post_init__(self) -> None:
         for name, names in _NAMES.items():

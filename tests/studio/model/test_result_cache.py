@@ -30,6 +30,34 @@ def test_plans_hold_as_long_as_what_they_are_of(results):
     assert results.plan(editor.document.regions[0], 0).checked.process.stepover_m == 0.02
 
 
+def test_a_first_look_is_near_the_plan_and_shown_until_that_is_there(results):
+    editor = results.editor
+    results.make_plans(editor.document, silent)
+    mesh = results.shown_mesh(editor.document.regions[0])
+    editor.change_numbers("top", 0, {"stepover_mm": 20.0})
+    document = editor.document
+    top, front = document.regions
+    assert results.shown_plan(top, 0) is None
+    results.look(document, "top", 0, silent)
+    look = results.shown_plan(top, 0)
+    assert results.plan(top, 0) is None and look.region is None and look.left is None
+    assert results.shown_mesh(top) is mesh and len(results.planned_lines(top)) == len(look.lines)
+    editor.change_numbers("top", 0, {"stepover_mm": 21.0})
+    assert results.shown_plan(editor.document.regions[0], 0) is look, "until the next one"
+    editor.change_numbers("top", 0, {"stepover_mm": 20.0})
+    results.make_plans(editor.document, silent)
+    plan = results.shown_plan(editor.document.regions[0], 0)
+    assert plan is not look and plan.region is not None
+    one, other = look.checked.metrics, plan.checked.metrics
+    assert one.coverage == pytest.approx(other.coverage, abs=0.02)
+    assert one.process_length_m == pytest.approx(other.process_length_m, rel=0.05)
+    assert one.cycle_time_s == pytest.approx(other.cycle_time_s, rel=0.1)
+    assert one.true_distance_95_m is None and other.true_distance_95_m is not None
+    editor.paint(REFERENCE, "top", front.mask)
+    top = editor.document.regions[0]
+    assert results.shown_plan(top, 0) is None and results.shown_mesh(top) is None
+
+
 def test_a_plan_that_is_refused_is_named_by_field_and_value(results):
     results.editor.change_numbers("top", 0, {"feed_mm_s": 0.0})
     results.editor.change_numbers("front", 0, {"edge_margin_mm": 900.0})

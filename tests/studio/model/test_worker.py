@@ -74,6 +74,26 @@ def test_the_newest_of_a_kind_replaces_what_waits_and_runs(log):
     assert "old" not in log.lines and "second" not in log.lines and "third" in log.lines
 
 
+def test_what_does_not_replace_lets_run_what_has_begun_and_keeps_the_newest(log):
+    begun, go_on = threading.Event(), threading.Event()
+
+    def slow(progress):
+        begun.set()
+        go_on.wait(5)
+        progress(0, 1)
+        log.lines.append("old")
+
+    log.worker.submit("look", "first", slow, replaces=False)
+    begun.wait(5)
+    for name in ("second", "third"):
+        work = lambda progress, name=name: log.lines.append(name)  # noqa: E731
+        log.worker.submit("look", name, work, replaces=False)
+    go_on.set()
+    assert log.worker.wait(5)
+    until_logged(log, ("third", ""))
+    assert "old" in log.lines and "second" not in log.lines and "third" in log.lines
+
+
 def test_a_delayed_job_that_is_replaced_never_begins(log):
     log.worker.submit("plan", "first", lambda progress: log.lines.append("ran"), delay_s=30.0)
     log.worker.submit("plan", "second", lambda progress: log.lines.append("second ran"))

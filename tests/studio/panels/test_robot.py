@@ -35,11 +35,11 @@ def test_a_cell_file_that_was_sent_is_what_simulations_are_for(page, tmp_path, m
     sent = SimpleNamespace(name="x.yaml", content=(tmp_path / "x").read_bytes())
     page.does(tab.refresh)
     assert "for the bundled arm" in tab.cell.content and not tab.without.visible
-    page.does(studio.read_cell, sent, tab._take)
+    page.does(tab._load, sent)
     assert "the cell **cell 3**" in tab.cell.content and tab.without.visible
     assert studio.cell.described == cell_of()
     assert "no cell file" in page.does(
-        studio.read_cell, SimpleNamespace(**{**vars(sent), "name": "x.doc"}), tab._take
+        tab._load, SimpleNamespace(**{**vars(sent), "name": "x.doc"})
     )
     assert studio.cell.described == cell_of()
     page.does(tab._take, type(studio.cell)())

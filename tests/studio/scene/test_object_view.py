@@ -54,6 +54,19 @@ def test_an_object_with_a_mesh_is_drawn_as_one_and_painted_points_above_it(scene
     assert view.points.colors.shape == (40, 3) and view.points.visible
 
 
+def test_where_a_scans_surface_has_a_hole_its_points_are_drawn(scene_view):
+    view = scene_view.add("box", PaintableCloud(cloud(SIZE, 600, 0)))
+    fine = trimesh.Trimesh(*vars(with_mesh().mesh).values()).subdivide_to_size(0.05)
+    open_above = fine.triangles_center[:, 1] < fine.vertices[:, 1].max() - 1e-6
+    view.draw_surface(Mesh(np.array(fine.vertices), np.array(fine.faces[open_above])))
+    view.set_colours(np.tile(BARE, (len(view.paintable.points), 1)).astype(np.uint8))
+    shown = view.points.points[:, 1] / scene_view.units_per_m
+    assert view.points.visible and shown.min() > fine.vertices[:, 1].max() - 0.05
+    view.draw_surface(Mesh(np.array(fine.vertices), np.array(fine.faces)))
+    view.set_colours(np.tile(BARE, (len(view.paintable.points), 1)).astype(np.uint8))
+    assert not view.points.visible
+
+
 def test_meshes_of_regions_replace_the_earlier_ones(scene_view):
     view = scene_view.add("box", PaintableCloud(with_mesh()))
     mesh = view.paintable.mesh

@@ -10,8 +10,8 @@ import pytest
 from nrdf.process.process import Process
 from nrdf.process.result_target import plan_result
 from nrdf.process.strategy import strategy_of
-from nrdf.process.transfer_result import PathResult
 from nrdf.process_model.cells import plate
+from nrdf.studio.model.computed import LeftResult
 from nrdf.studio.scene.result_map import result_legend, result_meshes
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -25,17 +25,17 @@ PAINT = Process.model_validate({
 
 
 @pytest.fixture(scope="module")
-def step():
+def left():
     mesh = plate(0.3, 0.2, 0.05)
     region = RegionMesh.from_faces(mesh, np.ones(len(mesh.faces), bool))
     taught = plan_on_mesh(region, strategy_of(PAINT))
     result = plan_result(region, PAINT, taught, False)
-    return PathResult("<top>", 0, PAINT, "replan", result=result)
+    return LeftResult.of("<top>", PAINT, result)
 
 
-def test_every_face_has_the_colour_of_its_film(step):
-    meshes = result_meshes([PathResult("legs", 0, PAINT, "replan"), step])
-    fine = step.result.model.cells.fine
+def test_every_face_has_the_colour_of_its_film(left):
+    meshes = result_meshes([left])
+    fine = left.mesh
     assert sum(len(mesh.faces) for mesh, _ in meshes.values()) == len(fine.faces)
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh, _ in meshes.values()])
     order = np.lexsort(corners.mean(axis=1).T)
@@ -44,11 +44,11 @@ def test_every_face_has_the_colour_of_its_film(step):
     assert len({tuple(colour) for _, colour in meshes.values()}) == len(meshes) > 1
 
 
-def test_the_legend_says_how_much_is_within_and_hides_no_markup(step):
-    html = result_legend("plate", [step])
-    assert f"{step.result.metrics.within:.1%} has the film wanted, 60 ± 6 µm" in html
+def test_the_legend_says_how_much_is_within_and_hides_no_markup(left):
+    html = result_legend("plate", [left])
+    assert f"{left.within:.1%} has the film wanted, 60 ± 6 µm" in html
     assert "&lt;top&gt;" in html and "<top>" not in html
     assert html.count("background:") == len(COLOURS)
     shares = [float(found) for found in re.findall(r"</span>([\d.]+)%", html)]
     assert sum(shares) == pytest.approx(100.0, abs=0.5)
-    assert result_legend("plate", [PathResult("legs", 0, PAINT, "replan")]) == ""
+    assert result_legend("plate", []) == "" and LeftResult.of("legs", PAINT, None) is None

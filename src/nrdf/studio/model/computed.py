@@ -4,13 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from nrdf.geometry.mesh import Mesh
 from nrdf.process.check import CheckedProcess
+from nrdf.process.process import Process
+from nrdf.process.result_target import result_settings
 from nrdf.process.strategy import strategy_of
+from nrdf.process_model.plan import PlannedResult
 from nrdf.toolpath.tool_segments import contact_points
+from nrdf.viz.heat_map import levels_of
+
+
+@dataclass(frozen=True)
+class LeftResult:
+    """The film or depth that a process leaves on a region: values (f,), m, on triangles of a mesh.
+
+    target_m, tolerance_m: what is wanted; within: the share of the area that has it, at_one_feed:
+    that would have it without planned feeds. film: whether it is film.
+    """
+
+    region: str
+    mesh: Mesh
+    values: np.ndarray
+    target_m: float
+    tolerance_m: float
+    within: float
+    at_one_feed: float
+    film: bool
+
+    @property
+    def what(self) -> str:
+        """What it is."""
+        return "film" if self.film else "depth"
+
+    @cached_property
+    def level_meshes(self) -> dict[int, Mesh]:
+        """The triangles of each range of `nrdf.viz.heat_map.LEVELS` that there is."""
+        made = {}
+        levels = levels_of(self.values, self.target_m, self.tolerance_m)
+        for level in np.unique(levels).tolist():
+            used, faces = np.unique(self.mesh.faces[levels == level], return_inverse=True)
+            made[level] = Mesh(self.mesh.vertices[used], faces.reshape(-1, 3))
+        return made
+
+    @staticmethod
+    def of(region: str, process: Process, planned: PlannedResult | None) -> LeftResult | None:
+        """Of a process whose result was planned; None without one."""
+        settings = result_settings(process)
+        if settings is None or planned is None:
+            return None
+        cells, target = planned.model.cells, settings.target
+        return LeftResult(
+            region, Mesh(cells.fine.vertices, cells.fine.faces),
+            cells.of_region(planned.model.values()), target.value_m, target.tolerance_m,
+            planned.metrics.within, planned.taught.within, process.thickness_um is not None,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -18,12 +69,13 @@ class Plan:
     """A process step, planned on the reference.
 
     fault: why there is no plan, "" where there is one; checked: None where the step is invalid.
-    region: the surface that it was planned on.
+    region: the surface that it was planned on; left: what it leaves there, where that is wanted.
     """
 
     fault: str
     checked: CheckedProcess | None = None
     region: Mesh | None = None
+    left: LeftResult | None = None
 
     @property
     def lines(self) -> list[np.ndarray]:

@@ -27,7 +27,7 @@ from nrdf.process.transfer import ProcessTransfer
 from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.cell_upload import store_cell
 from nrdf.studio.model.child_process import ChildProcess, answer, progress_of
-from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
+from nrdf.studio.model.computed import CorrespondenceFeatures, LeftResult, Plan
 from nrdf.studio.model.document import Document, LoadedObject, PaintedRegion
 from nrdf.studio.model.paintable_cloud import SHOWN_FACES, PaintableCloud
 from nrdf.studio.model.placing import PlacedScan, Placement, place_scan
@@ -133,8 +133,11 @@ class LocalComputing:
         progress(0, 1)
         return place_scan(scan, self._model(model), reference, "the scan", None, skipped, number)
 
-    def plan(self, reference: str, region: PaintedRegion, number: int, progress: Progress) -> Plan:
-        """Plan a process step of a region on the reference."""
+    def plan(
+        self, reference: str, region: PaintedRegion, number: int, rough: bool, progress: Progress
+    ) -> Plan:
+        """Plan a process step of a region on the reference; rough: for a first look, without the
+        region's mesh."""
         progress(0, 1)
         try:
             process = process_of(region, number)
@@ -145,9 +148,12 @@ class LocalComputing:
             mesh = paintable.region(region.mask, process.tool.radius_m)
         except ProcessError as error:
             return Plan(f"region '{region.name}': {error}")
-        checked = check_process(mesh, region.name, process, paintable.given)
+        given = None if rough else paintable.given
+        checked = check_process(mesh.for_a_look if rough else mesh, region.name, process, given)
         fault = f"{checked.where}: {checked.fault}" if checked.fault else ""
-        return Plan(fault, checked, Mesh(mesh.mesh.vertices, mesh.mesh.faces))
+        left = LeftResult.of(region.name, process, checked.result)
+        shown = None if rough else Mesh(mesh.mesh.vertices, mesh.mesh.faces)
+        return Plan(fault, replace(checked, result=None), shown, left)
 
     def surface(self, file: str, progress: Progress) -> Mesh | None:
         """The surface of an object, as far as it is drawn; None where there can be none."""
@@ -255,9 +261,10 @@ class ChildProcessComputing:
     def call(self, name: str, *args: Any, progress: Progress) -> Any:
         """As of `LocalComputing`. Raises ComputingProcessEnded if the process ends before it
         answers."""
-        if self._child is None or not self._child.alive:
+        if self._child is not None and not self._child.alive:
             self.end()
-            self._child = ChildProcess(_serve, (self._load,), _ended_error)
+        self.start()
+        assert self._child is not None  # it has been started
         sent = {f: None if f in self._known else c for f, c in self._wanted.items()}
         self._known = set(sent)
         try:
@@ -265,6 +272,11 @@ class ChildProcessComputing:
         except ComputingProcessEnded:
             self.end()
             raise
+
+    def start(self) -> None:
+        """Start the process before there is anything to compute: that takes seconds."""
+        if self._child is None:
+            self._child = ChildProcess(_serve, (self._load,), _ended_error)
 
     def end(self) -> None:
         """End the process."""

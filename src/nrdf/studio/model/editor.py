@@ -237,9 +237,11 @@ class Editor:
         step = {**self._step(region, number), **content}
         self._set_step(region, number, {k: v for k, v in step.items() if v is not None})
 
-    def change_numbers(self, region: str, number: int, shown: Mapping[str, float]) -> None:
-        """Set numbers of a step as the page shows them."""
-        self._set_step(region, number, changed_step(self._step(region, number), shown))
+    def change_numbers(
+        self, region: str, number: int, shown: Mapping[str, float], merge: bool = False
+    ) -> None:
+        """Set numbers of a step as the page shows them; merge: undone with the last change."""
+        self._set_step(region, number, changed_step(self._step(region, number), shown), merge)
 
     def restart_step(self, region: str, number: int, kind: str) -> None:
         """Set another kind of process, with its usual values."""
@@ -260,12 +262,14 @@ class Editor:
         left = tuple(step for i, step in enumerate(steps) if i != number)
         self.session.change(self.document.with_region(region, steps=left))
 
-    def _set_step(self, region: str, number: int, content: Mapping[str, Any]) -> None:
+    def _set_step(
+        self, region: str, number: int, content: Mapping[str, Any], merge: bool = False
+    ) -> None:
         steps = list(self._painted(region).steps)
         if content == steps[number]:
             return
         steps[number] = content
-        self.session.change(self.document.with_region(region, steps=tuple(steps)))
+        self.session.change(self.document.with_region(region, steps=tuple(steps)), merge)
 
     def _step(self, region: str, number: int) -> Mapping[str, Any]:
         return self._painted(region).steps[number]

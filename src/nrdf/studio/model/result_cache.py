@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from nrdf.process.limits import LOW_CONFIDENCE
 from nrdf.process.model_choice import choose_model
 from nrdf.process.transfer_result import TransferResult
 from nrdf.studio.model.cell_upload import CELL
-from nrdf.studio.model.computed import CorrespondenceFeatures, Plan
+from nrdf.studio.model.computed import CorrespondenceFeatures, LeftResult, Plan
 from nrdf.studio.model.computing import (
     ChildProcessComputing,
     LocalComputing,
@@ -44,6 +45,13 @@ class TargetResult:
         regions = self.transfer_result.regions.values()
         return [r.name for r in regions if r.missing or r.match.score < LOW_CONFIDENCE]
 
+    @cached_property
+    def left(self) -> list[LeftResult]:
+        """What the last process of each region with a wanted result leaves."""
+        paths = self.transfer_result.paths
+        made = {p.region: LeftResult.of(p.region, p.process, p.result) for p in paths if p.result}
+        return [left for left in made.values() if left is not None]
+
 
 class ResultCache:
     """Plans and transfer results of a document, each kept as long as it is current."""
@@ -53,6 +61,8 @@ class ResultCache:
         self.by_target: dict[str, TargetResult] = {}
         self._computing = computing
         self._plans: dict[tuple[str, int], tuple[bytes, Plan]] = {}
+        self._looked: tuple[np.ndarray, tuple[str, int], Plan] | None = None
+        self._region_meshes: dict[str, tuple[np.ndarray, Mesh]] = {}
         self._surfaces: dict[str, Mesh | None] = {}
         self._revision: tuple[Document, int] | None = None
         self._revisions = 0
@@ -129,13 +139,12 @@ class ResultCache:
                 "surface", loaded.file, progress=_within(progress, done, len(waiting))
             )
 
-    def with_a_target(self) -> list[str]:
-        """The targets on which a process has a film or depth that is wanted."""
-        return [
-            key
-            for key, found in self.by_target.items()
-            if any(path.result is not None for path in found.transfer_result.paths)
-        ]
+    def left_on(self, key: str) -> list[LeftResult]:
+        """What is left on an object, of each region's last process with a wanted result."""
+        if key == REFERENCE:
+            return self.left_on_reference()
+        found = self.by_target.get(key)
+        return [] if found is None else found.left
 
     # --- plans on the reference
 
@@ -145,10 +154,40 @@ class ResultCache:
         plan_key = _plan_key(self.editor.document, region, number)
         return kept[1] if kept is not None and kept[0] == plan_key else None
 
+    def shown_plan(self, region: PaintedRegion, number: int) -> Plan | None:
+        """The plan, or the last first look at a step of the region as it is painted now."""
+        made = self.plan(region, number)
+        if made is None and self._looked is not None:
+            mask, key, looked = self._looked
+            made = looked if key == (region.name, number) and mask is region.mask else None
+        return made
+
+    def shown_mesh(self, region: PaintedRegion) -> Mesh | None:
+        """The mesh of a region as it is painted now, where one of its steps was planned."""
+        mask, mesh = self._region_meshes.get(region.name, (None, None))
+        return mesh if mask is region.mask else None
+
     def planned_lines(self, region: PaintedRegion) -> list[np.ndarray]:
         """The lines, each (m, 3), of a region's steps that are planned."""
-        plans = [self.plan(region, number) for number in range(len(region.steps))]
+        plans = [self.shown_plan(region, number) for number in range(len(region.steps))]
         return [line for plan in plans if plan is not None for line in plan.lines]
+
+    def left_on_reference(self) -> list[LeftResult]:
+        """What the last step of each region with a wanted result leaves on the reference."""
+        found = []
+        for region in self.editor.document.regions:
+            plans = [self.shown_plan(region, number) for number in range(len(region.steps))]
+            left = [plan.left for plan in plans if plan is not None and plan.left is not None]
+            found += left[-1:]
+        return found
+
+    def look(self, document: Document, name: str, number: int, progress: Progress) -> None:
+        """Have a first look at a step of a region, until it is planned."""
+        region = document.region(name)
+        if region is None or document.reference is None or not region.mask.any():
+            return
+        made = self._plan(document, region, number, True, progress)
+        self._looked = region.mask, (name, number), made
 
     def make_plans(self, document: Document, progress: Progress) -> None:
         """Plan every step that is not planned yet, of regions that have points."""
@@ -161,14 +200,22 @@ class ResultCache:
             progress(done, len(waiting))
             if self.editor.document.reference is not document.reference:
                 return
-            plan_key = _plan_key(document, region, number)
-            self._computing.use_objects(_objects(document))
-            assert document.reference is not None  # regions are on one
-            made = self._computing.call(
-                "plan", document.reference.file, region, number,
-                progress=_within(progress, done, len(waiting)),
-            )  # fmt: skip
-            self._plans[region.name, number] = plan_key, made
+            within = _within(progress, done, len(waiting))
+            made = self._plan(document, region, number, False, within)
+            self._plans[region.name, number] = _plan_key(document, region, number), made
+            if made.region is not None:
+                self._region_meshes[region.name] = region.mask, made.region
+
+    def _plan(
+        self, document: Document, region: PaintedRegion, number: int, rough: bool,
+        progress: Progress,
+    ) -> Plan:  # fmt: skip
+        self._computing.use_objects(_objects(document))
+        assert document.reference is not None  # regions are on one
+        made: Plan = self._computing.call(
+            "plan", document.reference.file, region, number, rough, progress=progress
+        )
+        return made
 
     # --- targets
 

@@ -59,13 +59,19 @@ class Worker:
             return any(job.kind == kind for job in (*running, *self._waiting))
 
     def submit(
-        self, kind: str, what: str, work: Callable[[Progress], None], delay_s: float = 0.0
+        self,
+        kind: str,
+        what: str,
+        work: Callable[[Progress], None],
+        delay_s: float = 0.0,
+        replaces: bool = True,
     ) -> None:
-        """Run `work(progress)` after a delay; it replaces one of its kind that waits or runs."""
+        """Run `work(progress)` after a delay; it replaces one of its kind that waits or runs, or,
+        unless it `replaces`, that waits."""
         with self._changed:
             self._waiting = [job for job in self._waiting if job.kind != kind]
             self._waiting.append(_Job(kind, what, work, delay_s))
-            if self._running is not None and self._running.kind == kind:
+            if replaces and self._running is not None and self._running.kind == kind:
                 self._cancelled = True
             self._changed.notify_all()
 

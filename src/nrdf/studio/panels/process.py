@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -12,9 +13,10 @@ import numpy as np
 from nrdf.process.new_knowledge import KINDS
 from nrdf.reports.transfer_report import short_metric_cells
 from nrdf.studio.context import StudioContext
-from nrdf.studio.model.document import PaintedRegion
+from nrdf.studio.model.document import REFERENCE, PaintedRegion
 from nrdf.studio.model.teaching import NUMBERS, ORIGIN, PATTERNS, shown_numbers, si_name
 from nrdf.studio.panels.inputs import Inputs, PanelEvent
+from nrdf.studio.scene.colours import COLOURINGS, RESULT
 
 _LABELS = {
     "stepover_mm": ("Stepover, mm", "stepover_mm: distance between neighbouring lines"),
@@ -29,6 +31,12 @@ _LABELS = {
     "standoff_mm": ("Stand-off, mm", "standoff_mm: height above the surface; 0: contact"),
     "spindle_rpm": ("Spindle, rpm", "spindle_rpm; 0: none"),
 }
+_SLIDERS = {
+    "stepover_mm": (1.0, 100.0, 0.5), "feed_mm_s": (1.0, 500.0, 1.0),
+    "tilt_deg": (-60.0, 60.0, 1.0), "edge_margin_mm": (0.0, 50.0, 0.5),
+}  # fmt: skip
+"""Numbers to be dragged: from, to, in steps of. A file's own may lie outside."""
+_SAME_DRAG_S = 1.0  # between changes of a number that are undone together
 _BODY = {
     "body_length_m": (
         "Tool body length, mm",
@@ -40,7 +48,7 @@ _BODY = {
 _AMOUNTS = ("thickness_um", "removal_um")
 _SHOWN = ("kind", "trajectory", "direction", "tool", *(si_name(name) for name in NUMBERS))
 _SHOWN_OF_TOOL = ("name", "radius_m", "clearance_m", *_BODY)
-_MAIN = ("stepover_mm", "spacing_mm"), ("force_n", "feed_mm_s", "tilt_deg")
+_MAIN = ("stepover_mm", "edge_margin_mm"), ("force_n", "feed_mm_s", "tilt_deg")
 
 
 class ProcessTab:
@@ -60,6 +68,12 @@ class ProcessTab:
         self.numbers |= {name: self._number(name) for name in _MAIN[1]}
         self.tool = gui.add_text("Tool", "tool")
         self.tool_radius = gui.add_number("Tool radius, mm", 25.0, step=1.0)
+        self.map = gui.add_checkbox(
+            "Show film or depth", False, visible=False,
+            hint="What the process leaves: blue too little, red too much. While a number is "
+            "dragged, at one feed.",
+        )  # fmt: skip
+        self._dragged: tuple[object, float] = None, 0.0
         with gui.add_folder("More", expand_by_default=False):
             more = [name for name in NUMBERS if name not in self.numbers]
             self.numbers |= {name: self._number(name) for name in more}
@@ -79,6 +93,7 @@ class ProcessTab:
         for name, handle in self.numbers.items():
             inputs.on(handle.on_update, partial(self._set_number, name))
         inputs.on(self.plan.on_click, lambda _: self._plan_now())
+        inputs.on(self.map.on_update, lambda event: self._show_map(event.value))
         inputs.on(self.kind.on_update, lambda event: self._set_kind(event.value))
         inputs.on(self.pattern.on_update, lambda event: self._change(trajectory=event.value))
         inputs.on(self.longest.on_click, lambda _: self._change(direction=None))
@@ -104,6 +119,10 @@ class ProcessTab:
         inputs.set_options(self.pattern, patterns)
         inputs.set_value(self.pattern, pattern)
         for name, value in shown_numbers(step).items():
+            if name in _SLIDERS:
+                low, high, _ = _SLIDERS[name]
+                self.numbers[name].min = min(low, value)
+                self.numbers[name].max = max(high, value)
             inputs.set_value(self.numbers[name], value)
         tool = step["tool"]
         inputs.set_value(self.tool, str(tool.get("name", "tool")))
@@ -121,33 +140,45 @@ class ProcessTab:
             else f"Lines run along ({', '.join(f'{x:.2f}' for x in direction)}): the arrow."
         )
         self.status.content = "  \n".join([self._plan(region), *kept_as_it_is(step)])
+        self.map.visible = bool(context.results.left_on(REFERENCE))
+        inputs.set_value(self.map, context.colouring == RESULT)
         self.plan.visible = bool(region.mask.any()) and "Not planned" in self.status.content
 
     def _plan(self, region: PaintedRegion) -> str:
         """The metrics of the plan, in Markdown, or why there is none."""
         if not region.mask.any():
             return f"**{region.name}** has no points yet."
-        plan = self.context.results.plan(region, self.context.step)
+        results, step = self.context.results, self.context.step
+        plan = results.shown_plan(region, step)
         if plan is None:
             planning = self.context.worker.has_job("plan")
             return "*planning …*" if planning else "Not planned yet."
         if plan.fault or plan.checked is None or plan.checked.metrics is None:
             return f"⚠ {_labelled(plan.fault)}"
         metrics = plan.checked.metrics
-        covered, left_out, missed, widest, step, turn, off, _ = short_metric_cells(vars(metrics))
+        covered, left_out, missed, widest, longest, turn, off, _ = short_metric_cells(vars(metrics))
         minutes, seconds = divmod(round(metrics.cycle_time_s), 60)
         lines = [
             f"**{metrics.process_length_m:.2f} m** of lines, **{minutes} min {seconds} s**, "
             f"of the region **{covered} %** worked, {left_out} % left out, {missed} % missed",
-            f"lines at most {widest} mm apart, {off} mm off the object; steps of at most {step} "
-            f"mm, turns of at most {turn}°",
         ]
+        if plan.left is not None:
+            lines.append(f"**{plan.left.within:.0%}** of it has the {plan.left.what} wanted")
+        if results.plan(region, step) is None:
+            return "  \n".join([*lines, "*a first look; it is planned when you let go*"])
+        lines.append(
+            f"lines at most {widest} mm apart, {off} mm off the object; steps of at most {longest} "
+            f"mm, turns of at most {turn}°"
+        )
         lines += [f"⚠ {warning}" for warning in plan.checked.warnings]
         return "  \n".join(lines)
 
     def _number(self, name: str) -> Any:
-        label, hint = _LABELS[name]
-        return self.context.server.gui.add_number(label, 0.0, step=_increment(name), hint=hint)
+        (label, hint), gui = _LABELS[name], self.context.server.gui
+        if name in _SLIDERS:
+            low, high, step = _SLIDERS[name]
+            return gui.add_slider(label, low, high, step, low, hint=hint)
+        return gui.add_number(label, 0.0, step=_increment(name), hint=hint)
 
     def _set_number(self, name: str, event: PanelEvent) -> None:
         context = self.context
@@ -155,8 +186,12 @@ class ProcessTab:
         value = float(event.value)
         if not np.isfinite(value):
             return
-        context.editor.change_numbers(context.region, context.step, {name: value})
-        self._changed()
+        which, now = (context.region, context.step, name), time.monotonic()
+        again = self._dragged[0] == which and now - self._dragged[1] < _SAME_DRAG_S
+        self._dragged = which, now
+        context.editor.change_numbers(context.region, context.step, {name: value}, again)
+        context.look(context.region, context.step)
+        self.refresh()
 
     def _set_kind(self, kind: str) -> None:
         self.context.need_region()
@@ -195,6 +230,10 @@ class ProcessTab:
             context.editor.remove_step(context.region, context.step)
             context.step = max(context.step - 1, 0)
         self._changed()
+
+    def _show_map(self, shown: bool) -> None:
+        self.context.recolour(RESULT if shown else COLOURINGS[0], self.context.similarity_width)
+        self.context.refresh_panel()
 
     def _plan_now(self) -> None:
         self.context.plan(0.0)

@@ -13,6 +13,7 @@ from nrdf.geometry.units import METRES
 from nrdf.process.bound_knowledge import read_bound_knowledge
 from nrdf.process.model_choice import choose_model
 from nrdf.studio.context import StudioContext
+from nrdf.studio.file_reading import read_knowledge, read_object
 from nrdf.studio.model.document import Document
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs, PanelEvent
@@ -91,14 +92,14 @@ class ReferenceTab:
             self.context.editor.open_reference(file.name, cloud, category, model)
             self.context.restore()
 
-        self.context.read(file, category, unit_of(self.unit.value), opened)
+        read_object(self.context, file, category, unit_of(self.unit.value), opened)
 
     def _load_knowledge(self, file: Any) -> None:
         def opened(bound: BoundKnowledge) -> None:
             self.context.editor.open_knowledge(bound.knowledge.reference.cloud or REFERENCE, bound)
             self.context.restore()
 
-        self.context.read_knowledge(file, opened)
+        read_knowledge(self.context, file, opened)
 
     def _show_kind(self) -> None:
         self.kind.visible = self.category.value == OTHER_KIND

@@ -9,6 +9,7 @@ from typing import Any
 
 from nrdf.studio.arm_simulation import ArmSimulation
 from nrdf.studio.context import StudioContext
+from nrdf.studio.file_reading import read_cell
 from nrdf.studio.model.cell_upload import CELL, ENDINGS
 from nrdf.studio.model.studio_cell import StudioCell
 from nrdf.studio.panels.inputs import Inputs
@@ -62,7 +63,7 @@ class RobotTab:
         self.save = gui.add_button("Save the simulation")
         self.saved = gui.add_markdown("")
         self.status = gui.add_markdown("")
-        inputs.on(self.upload.on_upload, lambda event: context.read_cell(event.value, self._take))
+        inputs.on(self.upload.on_upload, lambda event: self._load(event.value))
         inputs.on(self.without.on_click, lambda _: self._take(StudioCell()))
         inputs.on(self.simulate.on_click, lambda _: simulation.start(self.target.value))
         inputs.on(self.play.on_click, lambda _: self._play())
@@ -114,6 +115,9 @@ class RobotTab:
         text = " · ".join(words)
         if self.now.content != text:
             self.now.content = text
+
+    def _load(self, file: Any) -> None:
+        read_cell(self.context, file, self._take)
 
     def _take(self, cell: StudioCell) -> None:
         """Another cell: what was simulated in the one before is put away."""

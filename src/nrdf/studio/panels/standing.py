@@ -7,6 +7,7 @@ from functools import partial
 
 from nrdf.errors import NrdfError
 from nrdf.studio.context import StudioContext
+from nrdf.studio.file_reading import clean_again
 from nrdf.studio.model.document import LoadedObject, Target
 from nrdf.studio.model.placing import (
     AS_IN_FILE,
@@ -131,7 +132,7 @@ class StandingFolder:
                 self.context.editor.replace_target(key, replace(placed, placement=placement))
                 self.context.sync()
 
-        self.context.clean_again(scan, skipped, number, cleaned)
+        clean_again(self.context, scan, skipped, number, cleaned)
 
 
 def unconfirmed(context: StudioContext) -> list[str]:

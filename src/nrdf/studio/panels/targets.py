@@ -10,6 +10,7 @@ from nrdf.process.limits import LOW_CONFIDENCE, Limits
 from nrdf.process.transfer_result import TransferResult
 from nrdf.reports.transfer_report import shares_in_words, transfer_report
 from nrdf.studio.context import StudioContext
+from nrdf.studio.file_reading import read_object, read_scan
 from nrdf.studio.model.placing import PlacedScan
 from nrdf.studio.model.uploads import BUNDLED, ENDINGS, bundled
 from nrdf.studio.panels.inputs import Inputs
@@ -70,10 +71,8 @@ class TargetsTab:
         inputs.set_value(self.colours, context.colouring)
         self.standing.refresh()
         visible = context.visible_objects() if context.colouring == RESULT else []
-        found = [(key, context.results.by_target.get(key)) for key in visible]
-        self.legend.content = "".join(
-            result_legend(key, one.transfer_result.paths) for key, one in found if one is not None
-        )
+        left_on = context.results.left_on
+        self.legend.content = "".join(result_legend(key, left_on(key)) for key in visible)
         self.legend.visible = bool(self.legend.content)
         self.status.content = "\n\n".join(self._about(key) for key in keys) or "No target yet."
 
@@ -93,9 +92,11 @@ class TargetsTab:
         self._need_reference()
         category, unit = self.context.editor.document.category, unit_of(self.unit.value)
         if self.stands.value == STANDS[0]:
-            self.context.read_scan(file, unit, lambda placed: self._add_scan(file.name, placed))
+            read_scan(self.context, file, unit, lambda placed: self._add_scan(file.name, placed))
         else:
-            self.context.read(file, category, unit, lambda cloud: self._add_cloud(file.name, cloud))
+            read_object(
+                self.context, file, category, unit, lambda cloud: self._add_cloud(file.name, cloud)
+            )
 
     def _need_reference(self) -> None:
         if self.context.editor.document.reference is None:
@@ -128,10 +129,11 @@ class TargetsTab:
         self.context.show_target(None if shown == ALL else shown)
 
     def _recolour(self) -> None:
-        if self.colours.value == RESULT and not self.context.results.with_a_target():
+        results, keys = self.context.results, self.context.editor.object_keys()
+        if self.colours.value == RESULT and not any(results.left_on(key) for key in keys):
             raise NrdfError(
-                "no process on a target says what it should leave: give one thickness_um or "
-                "removal_um in its knowledge file, and transfer it"
+                "no process says what it should leave: give one thickness_um or removal_um in its "
+                "knowledge file, and open it in step 1"
             )
         self.context.recolour(self.colours.value, float(self.width.value))
         self.refresh()

@@ -37,9 +37,9 @@ def region_meshes_of(
     result, target = results.by_target.get(key), editor.target(key)
     if key == REFERENCE:
         return {
-            region.name: (plan.region, np.array(_pale(region.colour)))
+            region.name: (mesh, np.array(_pale(region.colour)))
             for region in editor.document.regions
-            if (plan := results.plan(region, 0)) is not None and plan.region is not None
+            if (mesh := results.shown_mesh(region)) is not None
         }
     if result is None or target is None:
         return {}

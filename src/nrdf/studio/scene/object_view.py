@@ -24,6 +24,7 @@ _LIFT = 1.4  # of lines above points, in spacings
 _ON_MESH = 0.0015  # of lines above a mesh, in sides of the object; regions lie half as high
 _LIGHT = np.array([0.62, 0.70, 0.35])
 """Direction to the light: front, above, right."""
+_UNCOVERED = 0.8  # spacings from its surface from which a scan's point has none
 _REMOVED = (226, 140, 130)  # colour of points that cleaning removed
 _DARKEST = 0.58  # brightness of a point that faces away from the light
 
@@ -58,6 +59,7 @@ class ObjectView:
         self._removed: viser.SceneNodeHandle | None = None
         self._mesh: viser.SceneNodeHandle | None = None
         self._drawn: Triangles | None = None
+        self._bare = np.zeros(len(paintable.points), bool)
         self._drawn_regions: list[tuple[str, int, bytes]] = []
         self._held: list[Triangles] = []
         self.draw_surface(None)
@@ -116,14 +118,15 @@ class ObjectView:
     def set_colours(self, colours: np.ndarray) -> None:
         """Set the colours (k, 3) uint8 of the shown points; shading is added here.
 
-        Above a mesh only points that have a colour of their own are drawn.
+        Above a mesh only points that have a colour of their own are drawn, and those that a mesh
+        made of a scan has no surface at.
         """
         light = self.upright.T @ (_LIGHT / np.linalg.norm(_LIGHT))
         facing = 0.5 + 0.5 * self.paintable.normals @ light
         shade = _DARKEST + (1 - _DARKEST) * facing
         shaded = (colours * shade[:, None]).astype(np.uint8)
         if self._mesh is not None:
-            own = (colours != BARE.astype(np.uint8)).any(axis=1)
+            own = (colours != BARE.astype(np.uint8)).any(axis=1) | self._bare
             self.points.visible = bool(own.any())  # a browser takes no empty cloud
             if not own.any():
                 return
@@ -142,6 +145,12 @@ class ObjectView:
         if self._mesh is not None:
             self._mesh.remove()
         self._mesh = None if shown is None else self._add_mesh("mesh", shown, BARE)
+        self._bare = np.zeros(len(self.paintable.points), bool)
+        if shown is not None and self.paintable.mesh is None:
+            far = _UNCOVERED * self.paintable.surface.spacing
+            faces = np.asarray(shown.faces, np.int64)
+            away = igl.point_mesh_squared_distance(self.paintable.points, shown.vertices, faces)[0]
+            self._bare = np.asarray(away) > far**2
 
     def draw_removed(self, points: np.ndarray) -> None:
         """Draw points (k, 3), m, that cleaning removed, in place of earlier ones."""

@@ -114,7 +114,9 @@ def parts_of(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> lis
         closed = closed_border(region, strategy)
         return [Part(mesh, closed=closed) for mesh in chosen]
 
-    return region.last("parts", (_edge_m(strategy, edge), radius, margin), made)
+    return region.last(
+        ("parts", region.rough), (_edge_m(region, strategy, edge), radius, margin), made
+    )
 
 
 def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None:
@@ -126,14 +128,14 @@ def closed_border(region: RegionMesh, strategy: Strategy) -> ClosedBorder | None
 
 def refined(region: RegionMesh, strategy: Strategy, edge: float = _EDGE) -> FineMesh:
     """A region in triangles that are fine enough for the stepover, with edges of so many."""
-    return refine(region.mesh.vertices, region.mesh.faces, _edge_m(strategy, edge))
+    return refine(region.mesh.vertices, region.mesh.faces, _edge_m(region, strategy, edge))
 
 
-def _edge_m(strategy: Strategy, edge: float) -> float:
+def _edge_m(region: RegionMesh, strategy: Strategy, edge: float) -> float:
     """The longest edge of a region's triangles: so many stepovers or, for a first look, up to
     twice that."""
     longest = edge * strategy.stepover_m
-    return float(2.0 ** np.ceil(np.log2(longest))) if strategy.rough else longest
+    return float(2.0 ** np.ceil(np.log2(longest))) if region.rough else longest
 
 
 def even_levels(
