@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nrdf.surface.fine_mesh import FineMesh, refine
-from nrdf.surface.mesh_patches import patches_of
+from nrdf.surface.mesh_patches import Patches
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.surface.target_mesh import TargetMesh
 
@@ -19,8 +19,8 @@ class Cells:
     """Triangles of a surface, small to the tool.
 
     centres: (n, 3), m; normals: (n, 3), outward; areas_m2: (n,). inside: (n,), which are of the
-    region; they come first, in the order of `fine`, the region's own mesh, refined. number: where
-    a cell is a patch of several triangles of `fine`, that of each (f,).
+    region; they come first, in the order of `fine`, the region's own mesh, refined. patches: of
+    `fine`, where each cell is one.
     """
 
     centres: np.ndarray
@@ -28,17 +28,18 @@ class Cells:
     areas_m2: np.ndarray
     inside: np.ndarray
     fine: FineMesh
-    number: np.ndarray | None = None
+    patches: Patches | None = None
 
     @staticmethod
     def rough(region: RegionMesh, size_m: float) -> Cells:
         """Patches of that size of a region alone, for a first look."""
         mesh = region.mesh
         own = FineMesh(mesh.vertices, mesh.faces, np.arange(len(mesh.faces)), size_m)
-        number, nearest = patches_of(own, size_m)
+        patches = Patches.of(own, size_m)
+        nearest = patches.nearest
         centres, normals, _ = region.on_parent(own.centres[nearest], own.normals[nearest])
-        areas = np.bincount(number, own.areas)
-        return Cells(centres, normals, areas, np.ones(len(areas), bool), own, number)
+        areas = np.bincount(patches.number, own.areas)
+        return Cells(centres, normals, areas, np.ones(len(areas), bool), own, patches)
 
     @staticmethod
     def of(region: RegionMesh, edge_m: float, around_m: float) -> Cells:
@@ -65,7 +66,7 @@ class Cells:
     def of_region(self, values: np.ndarray) -> np.ndarray:
         """Of values (n,), those of the region's triangles in `fine` (f,)."""
         own = values[self.inside]
-        return own if self.number is None else own[self.number]
+        return own if self.patches is None else self.patches.to_triangles(own)
 
 
 def _beside(

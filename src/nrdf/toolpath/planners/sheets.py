@@ -14,7 +14,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from nrdf.surface.fine_mesh import FineMesh
-from nrdf.surface.mesh_patches import patches_of
+from nrdf.surface.mesh_patches import Patches
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.planners.distance import distance_from
 from nrdf.toolpath.planners.field_lines import Part
@@ -89,9 +89,9 @@ def felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndar
 
 
 def _felt_normals(region: RegionMesh, mesh: FineMesh, radius_m: float) -> np.ndarray:
-    number, nearest = patches_of(mesh, radius_m / _PER_RADIUS)
-    felt = region.mesh.smooth_normals(mesh.centres[nearest], mesh.origin[nearest], radius_m)
-    return np.asarray(felt[number])
+    patches = Patches.of(mesh, radius_m / _PER_RADIUS)
+    places, faces = mesh.centres[patches.nearest], mesh.origin[patches.nearest]
+    return patches.to_triangles(region.mesh.smooth_normals(places, faces, radius_m))
 
 
 def is_round_rod(part: Part) -> bool:
