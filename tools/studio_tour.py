@@ -12,6 +12,7 @@ millimetres.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -32,7 +33,8 @@ ROOT = Path(__file__).parents[1]
 SHARED = ROOT.parent / "shared"
 OUT = ROOT / "build" / "studio-tour"
 FLAGS = ("--no-sandbox", "--headless", "--use-gl=angle", "--use-angle=swiftshader",
-         "--enable-unsafe-swiftshader")  # fmt: skip
+         "--enable-unsafe-swiftshader", "--webgl-antialiasing-mode=none",
+         "--webgl-msaa-sample-count=0")  # fmt: skip
 SIZE = (1280, 720)
 MOST_CLICKS, MOST_WAIT_S, MOST_S = 25, 90.0, 600.0
 SEAT, BACK = (0.53, 0.61), (0.45, 0.41)  # places of the bundled chair in the first view
@@ -114,6 +116,41 @@ class Tour:
                 self.findings.append(f"{where}: {found['id']} ({found['impact']}): {places}")
 
 
+def own_processes() -> dict[int, list[str]]:
+    """Processes that this one and its own have started, with what the system says of them."""
+    said = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            name, _, rest = stat.read_text().partition("(")[2].rpartition(")")
+            said[int(stat.parent.name)] = [name, *rest.split()]
+    own = {}
+    for process, words in said.items():
+        above = process
+        while above in said and above != os.getpid():
+            above = int(said[above][2])
+        if above == os.getpid() != process:
+            own[process] = words
+    return own
+
+
+def calm() -> None:
+    """Give the browser's processes, of which the one that draws begins with more weight, as much
+    as the studio has, where the system lets us."""
+    for process in own_processes():
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, process, 0)
+
+
+def processor_time() -> dict[str, float]:
+    """What studio and browser have taken of the processor so far, s: on a busy machine, what was
+    waited for says little."""
+    spent = {"studio": 0.0, "browser": 0.0}
+    for name, *words in own_processes().values():
+        what = "studio" if "python" in name or "nrdf" in name else "browser"
+        spent[what] += (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+    return {what: round(seconds, 1) for what, seconds in spent.items()}
+
+
 def teach(tour: Tour) -> None:
     """From an empty page to two regions on the bundled chair."""
     tour.wait_for("Next:", "opening the page")
@@ -183,6 +220,7 @@ def main() -> int:
             page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
             page.set_default_timeout(120e3)
             page.add_init_script(SELDOM)
+            calm()
             page.goto(address)
             tour = Tour(page)
             teach(tour)
@@ -197,13 +235,16 @@ def main() -> int:
                 time.sleep(0.5)
                 tour.check_access(tab)
             tour.shoot("robot")
+            spent = processor_time()
             browser.close()
         finally:
             studio.terminate()
             studio.wait(20)
     film(tour.frames)
-    figures = {"paths": paths, "console_errors": tour.errors, "axe_serious": tour.findings,
-               "took_s": round(time.monotonic() - begun)}  # fmt: skip
+    figures = {
+        "paths": paths, "processor_s": spent, "took_s": round(time.monotonic() - begun),
+        "console_errors": tour.errors, "axe_serious": tour.findings,
+    }  # fmt: skip
     (OUT / "figures.json").write_text(json.dumps(figures, indent=1) + "\n")
     print(json.dumps(figures, indent=1))
     good = not tour.errors and not tour.findings and figures["took_s"] <= MOST_S
