@@ -9,7 +9,6 @@ import numpy as np
 import nrdf
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import Similarity, up_axis, upright
-from nrdf.scans.aligned_scan import pose_scorer
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.scans.simulate import ScanSettings, SimulatedScan, simulate_scan
 from nrdf.shapes.families import get_family
@@ -51,7 +50,7 @@ def yaw_error(found: Similarity, true: Similarity) -> float:
 @cache
 def scorer(category: str) -> PoseScorer:
     """That of the zoo's model."""
-    return pose_scorer(nrdf.load_model(category))
+    return PoseScorer(nrdf.load_model(category))
 
 
 @cache

@@ -11,13 +11,13 @@ import nrdf
 from nrdf.errors import DataError
 from nrdf.regions.match import Match
 from nrdf.regions.presence import ABSENT, Presence
-from nrdf.scans.aligned_scan import pose_scorer
+from nrdf.scans.pose_scorer import PoseScorer
 from nrdf_benchmark import scans
 
 
 @pytest.fixture(scope="module")
 def scorer():
-    return pose_scorer(nrdf.load_model("car"))
+    return PoseScorer(nrdf.load_model("car"))
 
 
 def test_poses_of_an_item_are_scored_the_same_every_time(scorer):

@@ -9,7 +9,6 @@ from builders.scenes import UP, full, pose, scorer, yaw_error
 from nrdf.errors import CloudError
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.align import Alignment, Candidate, align_scan
-from nrdf.scans.field_pose_scorer import FieldPoseScorer
 
 CHAIR = 1_000_003
 PLACE = pose(2.2, 900.0, (300, -50, 20))
@@ -29,28 +28,6 @@ def test_a_full_cloud_is_found_in_any_pose(category):
     assert [c.cost for c in found.candidates] == sorted(c.cost for c in found.candidates)
     yaw = np.degrees(best.yaw - 2.2) % 360
     assert min(yaw, 360 - yaw) < 2 and np.allclose(best.up, UP)
-
-
-class Facing:
-    """Says that everything is turned by one yaw (rad), this sure of it."""
-
-    def __init__(self, yaw: float, sure: float) -> None:
-        self.told = sure * np.cos(2 * np.pi / 36 * np.arange(36) - yaw)
-
-    def log_probability(self, points, normals):
-        assert points.shape == normals.shape and len(points) > 512
-        return self.told
-
-
-@pytest.mark.parametrize(("way", "sure", "turned"), [(2.2, 3, 0), (2.2 + np.pi, 60, 180)])
-def test_what_faces_the_other_way_is_told_by_field_and_network_together(way, sure, turned):
-    points = PLACE.to_scan(full("car", CHAIR).points)
-    asked = FieldPoseScorer(scorer("car").model, yaw=Facing(way, sure))
-    found = align_scan(asked, PointCloud(points), UP)
-    assert yaw_error(found.best.pose, PLACE) == pytest.approx(turned, abs=2)
-    other = next(c for c in found.candidates if yaw_error(c.pose, found.best.pose) > 170)
-    assert other.probability < 0.3 and other.cost > other.field_cost
-    assert found.best.cost == pytest.approx(found.best.field_cost, abs=0.01)
 
 
 def test_likely_poses_are_those_that_no_other_one_beats_clearly():

@@ -107,3 +107,4 @@ def test_without_a_network_a_target_is_compared_with_the_reference(monkeypatch):
     lying = taught.check_kind(taught.model.encode(PointCloud(member("chair")[:, [0, 2, 1]])))
     assert same.fits and same.probability is None and not lying.fits
     assert "what is known explains it at a cost of" in car.warnings[0]
+    assert "standing with +Z up; give --up z" in lying.warnings[0]

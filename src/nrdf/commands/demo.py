@@ -173,7 +173,8 @@ def _from_scan(folder: Path, process_transfer: ProcessTransfer) -> TransferResul
     from nrdf.geometry.similarity import Similarity, up_axis, upright
     from nrdf.io.cloud import write_cloud
     from nrdf.io.ply import write_ply_mesh
-    from nrdf.scans.aligned_scan import clean_and_align, pose_scorer
+    from nrdf.scans.aligned_scan import clean_and_align
+    from nrdf.scans.pose_scorer import PoseScorer
     from nrdf.scans.simulate import ScanSettings, simulate_scan
     from nrdf.surface.given_surface import MeshSurface
 
@@ -184,7 +185,7 @@ def _from_scan(folder: Path, process_transfer: ProcessTransfer) -> TransferResul
     rng = np.random.default_rng(0)
     scan = simulate_scan(mesh.vertices, mesh.faces, settings, rng, pose, unit="m")
     write_cloud(folder / f"{REAL}.ply", scan.cloud)
-    aligned = clean_and_align(pose_scorer(process_transfer.model), scan.cloud)
+    aligned = clean_and_align(PoseScorer(process_transfer.model), scan.cloud)
     encoded = aligned.encode_in_metres("m")
     # Not a part of the cloud: paths would be planned on it.
     vertices = scan.pose.to_scan(mesh.vertices)

@@ -55,7 +55,6 @@ def gather() -> dict[str, Any]:
     import torch
 
     from nrdf.field.kind_network import KIND_ZOO
-    from nrdf.field.yaw_network import YAW_ZOO
     from nrdf.field.zoo import list_models, user_zoo
 
     devices = {"cpu": f"{torch.get_num_threads()} threads"}
@@ -63,8 +62,7 @@ def gather() -> dict[str, Any]:
         memory = torch.cuda.get_device_properties(i).total_memory
         devices[f"cuda:{i}"] = f"{torch.cuda.get_device_name(i)}, {memory / 2**30:.0f} GiB"
     entries = [(entry.name, entry) for entry in list_models()]
-    for zoo in (YAW_ZOO, KIND_ZOO):
-        entries += [(f"{entry.name}, {entry.preset}", entry) for entry in list_models(zoo)]
+    entries += [(f"{entry.name}, {entry.preset}", entry) for entry in list_models(KIND_ZOO)]
     own = {entry.name for entry in list_models(user_zoo())}
     models = [
         {

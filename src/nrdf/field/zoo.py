@@ -35,10 +35,9 @@ INDEX = "index.json"
 _LARGEST_INDEX = 10_000_000  # bytes
 LARGEST = 8_000_000
 """Bytes that a weight file in the zoo may have."""
-YAW = "yaw"
-"""Preset of what tells yaw (`nrdf.field.yaw_network`): no field, so it has a folder of its own."""
 KIND = "kind"
-"""Preset of what tells the kind of object (`nrdf.field.kind_network`), likewise."""
+"""Preset of what tells the kind of object (`nrdf.field.kind_network`): no field, so it has a folder
+of its own."""
 WEIGHTS = "weights.safetensors"
 """What a finished training run calls its weight file."""
 
@@ -160,7 +159,7 @@ def add_to_zoo(
 ) -> ZooEntry:
     """Copy a weight file into the zoo and enter it into the index, replacing one of that name.
 
-    What tells yaw or kind goes into the zoo's folder `yaw` or `kind`.
+    What tells the kind of object goes into the zoo's folder `kind`.
 
     `name` is the category unless given; `scores` are added to those in the file. Raises ModelError
     for a file that is damaged or larger than 8 MB, OutputError if the zoo cannot be written.
@@ -173,7 +172,7 @@ def add_to_zoo(
             f"{path} has {size / 1e6:.1f} MB; the zoo takes at most {LARGEST / 1e6:.0f} MB: "
             "train a smaller field"
         )
-    if metadata["preset"] in (YAW, KIND):
+    if metadata["preset"] == KIND:
         zoo = zoo / metadata["preset"]
     name = name or str(metadata["category"])
     fault = file_name_problem(name) or (

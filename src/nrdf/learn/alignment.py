@@ -19,7 +19,7 @@ from nrdf.learn.objects import cloud_of, turned
 from nrdf.regions.model import load_model
 from nrdf.scans.align import align_scan
 from nrdf.scans.mirror import mirror_plane
-from nrdf.scans.registration_pose_scorer import RegistrationPoseScorer
+from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.shapes.correspond import choose_templates
 from nrdf.shapes.dataset import Shape
 
@@ -28,7 +28,7 @@ _AS_GIVEN = np.radians(15)
 """Yaws nearer to each other are one heading."""
 _MOST = 0.6  # share of the files that makes their heading the one to keep
 _MIRRORED = 0.15  # of cost that a mirror image must be better by
-_ODD = 1.55  # cost from which an object is unlike the others (`RegistrationPoseScorer`)
+_ODD = 1.55  # cost from which an object is unlike the others (`PoseScorer`)
 _PROTOTYPES = 3
 _POOR = 1.05  # usual cost from which other axes are tried
 _MUCH_BETTER = 0.15
@@ -99,7 +99,7 @@ def align_objects(
             yaw = 0.0  # the file's own heading is more exact than an alignment
         aligned.append(AlignedObject(shape, yaw, False, cost))
     in_frame = turned(shapes[first], rotation_about_up(aligned[first].yaw))
-    judge = RegistrationPoseScorer(load_model(REGISTRATION), [cloud_of(in_frame)])
+    judge = PoseScorer(load_model(REGISTRATION), [cloud_of(in_frame)])
     made = [_in_frame(one, judge) for one in aligned]
     odd = [one for one in made if one.cost > _ODD]
     kept = [one for one in made if one.cost <= _ODD]
@@ -128,9 +128,9 @@ def better_axis(shapes: Sequence[Shape], aligned: AlignedObjects) -> str:
 
 def _align(shape: Shape, known: Sequence[Shape]) -> tuple[np.ndarray, float]:
     """The likely yaws (k,), the likeliest first, and the least cost of a shape."""
-    scorer = RegistrationPoseScorer(load_model(REGISTRATION), [cloud_of(one) for one in known])
+    scorer = PoseScorer(load_model(REGISTRATION), [cloud_of(one) for one in known])
     found = align_scan(scorer, cloud_of(shape), UP).likely
-    return np.array([one.yaw for one in found]), min(one.field_cost for one in found)
+    return np.array([one.yaw for one in found]), min(one.cost for one in found)
 
 
 def find_prototype(shapes: Sequence[Shape]) -> int:
@@ -180,7 +180,7 @@ def _common_heading(yaws: Sequence[np.ndarray], named: int | None) -> tuple[floa
     return float(best), True
 
 
-def _in_frame(one: AlignedObject, judge: RegistrationPoseScorer) -> AlignedObject:
+def _in_frame(one: AlignedObject, judge: PoseScorer) -> AlignedObject:
     """The object in the common frame, as its mirror image where that is much more alike."""
     shape = turned(one.shape, rotation_about_up(one.yaw))
     image = turned(shape, np.diag(np.asarray(MIRROR, float)))

@@ -26,7 +26,6 @@ from nrdf.regions.presence import evidence_of, find_presence
 from nrdf.regions.refine import Refiner
 from nrdf.regions.region import region_indices
 from nrdf.regions.registration_mapper import RegistrationMapper
-from nrdf.scans.aligned_scan import pose_scorer
 from nrdf.scans.kind_check import KindCheck, check_kind
 from nrdf.scans.pose_scorer import PoseScorer
 
@@ -65,7 +64,7 @@ class EncodedReference:
 
     @cached_property
     def _scorer(self) -> PoseScorer:
-        return pose_scorer(self.model, [self.encoded_cloud.cloud])
+        return PoseScorer(self.model, [self.encoded_cloud.cloud])
 
     @cached_property
     def _refiner(self) -> Refiner:

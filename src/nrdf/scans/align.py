@@ -1,8 +1,8 @@
 """Bringing a scan into its category's frame: yaw, scale and centre, and what else it might be.
 
-Yaws over the full circle are scored by the field (`nrdf.scans.pose_scorer`) and by a network that
-tells which way an object faces (`nrdf.field.yaw_network`). The best are refined by the object's own
-mirror plane (`nrdf.scans.mirror`) and scored again, front and back exchanged too.
+Yaws over the full circle are scored by known objects of the kind (`nrdf.scans.pose_scorer`). The
+best are refined by the object's own mirror plane (`nrdf.scans.mirror`) and scored again, front and
+back exchanged too.
 """
 
 from __future__ import annotations
@@ -13,29 +13,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
-from nrdf.field.yaw_network import log_probability_at
 from nrdf.geometry.canonical import MIRROR, canonical_transform, rotation_about_up
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import AXES, Similarity, up_axis, upright
 from nrdf.io.cloud import PointCloud, check_cloud
 from nrdf.scans.mirror import MirrorPlane, mirror_plane
-from nrdf.scans.pose_scorer import PoseScorer, sparse_subset
+from nrdf.scans.pose_scorer import COST_SCALE, PoseScorer, sparse_subset
 
 WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
-_REFINED = 4  # of them that are refined, by the field's score alone
-_REFINED_WITH_YAW = 3, 2  # by the field's, and by the network's where there is one
+_REFINED = 4  # of them that are refined
 _NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
-# Difference of cost that makes a pose e times less likely (without a network it is the scorer's).
-# It, and what the network counts for, were chosen on 84 scans (half of them single views) of cars
-# that the network was not trained on: no right pose is ambiguous.
-_COST_SCALE_WITH_YAW = 0.1
-_YAW_COST = 0.1  # of a yaw that is e times less likely than the likeliest, by the network
-_LARGEST_YAW_COST = 3.0  # of those logarithms: the field can outweigh the network
 SURE = 0.8
 """Probability of a pose against any other one alone, below which both are likely."""
 
@@ -45,10 +37,9 @@ class Candidate:
     """One pose that may be the right one.
 
     pose: from canonical coordinates to the scan's. up: (3,) in the scan. yaw: (rad) about it.
-    cost: how badly the field explains the scan in this pose (`field_cost`), and how unlikely
-    the yaw is by the network of yaws. symmetry: share of the points that have a counterpart across
-    the mirror plane, 0 where none was found. probability: of this pose among the candidates, which
-    add up to 1.
+    cost: how badly the known objects explain the scan in this pose. symmetry: share of the points
+    that have a counterpart across the mirror plane, 0 where none was found. probability: of this
+    pose among the candidates, which add up to 1.
     """
 
     pose: Similarity
@@ -57,7 +48,6 @@ class Candidate:
     cost: float
     symmetry: float
     probability: float = 1.0
-    field_cost: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -146,19 +136,12 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
     chosen = sparse_subset(working.points, _COARSE_POINTS)
     costs: np.ndarray = scorer.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
-    yaw_log_probability = _yaw_log_probability(scorer, working, ups)
     best = _minima(costs, _REFINED)
-    if scorer.yaw is not None:
-        yaw_costs = -np.array([log_probability_at(row, yaws) for row in yaw_log_probability])
-        by_field, by_network = _REFINED_WITH_YAW
-        best = np.unique([*best[:by_field], *_minima(yaw_costs, by_network)])
-    lap("facing")
     refined = [found for index in best for found in _refine(working, tried[index])]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
-    field_costs = scorer.fine(points, normals, *_completed(points, normals, refined))
-    costs = field_costs + _YAW_COST * _yaw_costs(yaw_log_probability, ups, refined)
+    costs = scorer.fine(*_completed(points, normals, refined))
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
         found = refined[index]
@@ -166,11 +149,9 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
             pose = found.frame(working.points).then(working.to_scan)
             symmetry = found.plane.agreement if found.plane is not None else 0.0
             yaw = float(np.arctan2(np.sin(found.yaw), np.cos(found.yaw)))
-            cost, alone = float(costs[index]), float(field_costs[index])
-            candidates.append(Candidate(pose, found.up, yaw, cost, symmetry, field_cost=alone))
+            candidates.append(Candidate(pose, found.up, yaw, float(costs[index]), symmetry))
     lap("fine")
-    scale = scorer.cost_scale if scorer.yaw is None else _COST_SCALE_WITH_YAW
-    weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / scale)
+    weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / COST_SCALE)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
 
@@ -193,31 +174,6 @@ def _posed(
     frames = [found.frame(working.points) for found in hypotheses]
     points = [frame.to_canonical(working.points[chosen]) for frame in frames]
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
-
-
-def _yaw_log_probability(
-    scorer: PoseScorer, working: _Working, ups: list[np.ndarray]
-) -> np.ndarray:
-    """Log probabilities (ups, bins) of the yaws about each up; all equal without a network."""
-    if scorer.yaw is None:
-        return np.zeros((len(ups), _YAWS))
-    order = np.random.default_rng(0).permutation(len(working.points))
-    points, normals = working.points[order], working.normals[order]
-    turns = [upright(up) for up in ups]
-    return np.array([scorer.yaw.log_probability(points @ t, normals @ t) for t in turns])
-
-
-def _yaw_costs(
-    log_probability: np.ndarray, ups: list[np.ndarray], refined: list[_Hypothesis]
-) -> np.ndarray:
-    """The network's cost of each hypothesis (h,): how much less likely, in logarithms, up
-    to what makes it sure."""
-    numbers = [next(i for i, up in enumerate(ups) if up is found.up) for found in refined]
-    likely = [
-        log_probability_at(log_probability[i], found.yaw)
-        for i, found in zip(numbers, refined, strict=True)
-    ]
-    return np.minimum(-np.array(likely), _LARGEST_YAW_COST)
 
 
 def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:

@@ -11,8 +11,6 @@ import numpy as np
 
 from nrdf.field.cloud_encoder import WORKING_POINTS, CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.field.general import GENERAL
-from nrdf.field.registration import REGISTRATION
 from nrdf.geometry.sampling import downsample
 from nrdf.geometry.similarity import Similarity, up_axis
 from nrdf.geometry.units import METRES, Unit, find_unit
@@ -20,10 +18,8 @@ from nrdf.io.cloud import PointCloud, in_metres
 from nrdf.io.inputs import as_cloud
 from nrdf.scans.align import Alignment, align_scan
 from nrdf.scans.clean import Cleaned, clean_scan, unthinned
-from nrdf.scans.field_pose_scorer import FieldPoseScorer
 from nrdf.scans.kind_check import KindCheck, check_by_network, check_by_scorer
 from nrdf.scans.pose_scorer import PoseScorer
-from nrdf.scans.registration_pose_scorer import RegistrationPoseScorer
 
 _ONE_SIDED = (0.5, 0.9)
 """Symmetry between which the field is shown the mirror image too: the plane is trusted, and what
@@ -79,7 +75,7 @@ class AlignedScan:
         points = points[downsample(points, WORKING_POINTS, np.random.default_rng(0))]
         points, model = self.pose.to_canonical(points), self.scorer.model
         if model.kind_network is None:
-            return check_by_scorer(self.scorer, self.alignment.best.field_cost, points)
+            return check_by_scorer(self.scorer, self.alignment.best.cost, points)
         return check_by_network(model.kind_network, model.category, points, self.pose.rotation)
 
     @property
@@ -112,17 +108,6 @@ def is_one_sided(symmetry: float) -> bool:
     return low < symmetry < high
 
 
-def pose_scorer(model: CloudEncoder, examples: Sequence[PointCloud] = ()) -> PoseScorer:
-    """What scores poses by a model: by its field, or, for one of every category, by examples.
-
-    examples: in canonical orientation, instead of members of the category's family. Raises
-    ModelError if there are none and the model has no family.
-    """
-    if model.preset in (GENERAL, REGISTRATION):
-        return RegistrationPoseScorer(model, examples)
-    return FieldPoseScorer(model, examples)
-
-
 def align(
     model: CloudEncoder,
     scan: Any,
@@ -134,7 +119,7 @@ def align(
 ) -> AlignedScan:
     """Clean a scan of one object in any pose, and align it with the model's category.
 
-    For many scans, make one `pose_scorer` and use `clean_and_align`.
+    For many scans, make one `PoseScorer` and use `clean_and_align`.
 
     Args:
         model: the category's model, as `nrdf.load_model` gives it.
@@ -153,7 +138,7 @@ def align(
     direction = None if up == "auto" else up_axis(up)
     scan = as_cloud(scan, "the scan")
     known = [as_cloud(example, "an example") for example in examples]
-    return clean_and_align(pose_scorer(model, known), scan, direction, sensors, unit, skip)
+    return clean_and_align(PoseScorer(model, known), scan, direction, sensors, unit, skip)
 
 
 def clean_and_align(

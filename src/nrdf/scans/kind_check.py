@@ -15,11 +15,10 @@ import numpy as np
 from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.field.kind_network import ASKEW, ORIENTATIONS, OTHER, TILTED, KindNetwork, up_of
-from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.similarity import AXES, up_axis
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.objects import count_objects
-from nrdf.scans.pose_scorer import PoseScorer
+from nrdf.scans.pose_scorer import COST_MARGIN, LARGEST_Z_SCORE, USUAL_COST, PoseScorer
 
 MINIMUM_PROBABILITY = 0.3
 """Probability that an object stands upright and faces forward, below which there is a warning."""
@@ -82,17 +81,20 @@ def check_kind(
     network = model.kind_network
     if network is None:
         given = scorer()
-        yaw = given.better_yaw(target)
-        if yaw is not None:
-            forward = target.pose.rotation @ rotation_about_up(yaw)[:, 0]
-            return _turned(given.name, forward, target.pose.rotation)
+        turn = given.better_turn(target)
+        if turn is not None:
+            return _turned(given.name, target.pose.rotation, turn)
         return check_by_scorer(given, given.cost_of(target), target.points)
     return check_points(network, model.category, target.points, target.pose.rotation)
 
 
-def _turned(category: str, forward: np.ndarray, rotation: np.ndarray) -> KindCheck:
-    """A target that looks like its kind facing in another direction (3,)."""
-    looks, up = f"facing {_axis(forward)}", _letter(rotation[:, 1])
+def _turned(category: str, rotation: np.ndarray, turn: np.ndarray) -> KindCheck:
+    """A target that looks like its kind in another orientation: turned by `turn` (3, 3) in the
+    canonical frame, which `rotation` (3, 3) takes to that of the file."""
+    forward, upward = (rotation @ turn[:, axis] for axis in (0, 1))
+    looks, up = f"facing {_axis(forward)}", _letter(upward)
+    if turn[1, 1] < 0.5:
+        looks = f"standing with {_axis(upward)} up"
     warning = (
         f"the target does not look like a {category} facing {_axis(rotation[:, 0])}: it looks more "
         f"like one that is {looks}; give --up {up} to have it aligned"
@@ -197,11 +199,11 @@ def check_by_scorer(scorer: PoseScorer, cost: float, points: np.ndarray) -> Kind
     cost: at which those explain the points (`PoseScorer.fine`).
     """
     category, z_score = scorer.name, scorer.proportion_z_score(points)
-    if cost < scorer.usual_cost + scorer.cost_margin and z_score < scorer.largest_z_score:
+    if cost < USUAL_COST + COST_MARGIN and z_score < LARGEST_Z_SCORE:
         return KindCheck(category, "like what is known of its kind")
     warning = (
         f"the target does not look like a {category} standing upright and facing +X: what is known "
-        f"explains it at a cost of {cost:.2f}, {scorer.usual_cost:.2f} is usual, and its "
+        f"explains it at a cost of {cost:.2f}, {USUAL_COST:.2f} is usual, and its "
         f"proportions are {z_score:.1f} standard deviations off; check that it is one, and "
         "give --up with the direction that points up if it is in another pose"
     )

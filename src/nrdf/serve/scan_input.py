@@ -83,6 +83,8 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
     """What a report says of a scan's cleaning and alignment."""
     import numpy as np
 
+    from nrdf.scans.pose_scorer import USUAL_COST
+
     best, unit = found.alignment.best, found.unit
     sensors = found.scan.sensors
     return {
@@ -90,8 +92,7 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
         "scale": best.pose.scale,
         "probability": round(best.probability, 4),
         "cost": round(best.cost, 4),
-        "field_cost": round(best.field_cost, 4),
-        "usual_cost": round(found.scorer.usual_cost, 4),
+        "usual_cost": USUAL_COST,
         "kind": found.kind.describe(),
         "warnings": found.warnings,
         "unit": {"name": unit.name, "origin": unit.origin},
@@ -103,7 +104,6 @@ def describe_alignment(found: AlignedScan) -> Mapping[str, Any]:
                 "up": c.up,
                 "yaw_degrees": round(float(np.degrees(c.yaw)), 2),
                 "cost": round(c.cost, 4),
-                "field_cost": round(c.field_cost, 4),
                 "probability": round(c.probability, 4),
                 "symmetry": round(c.symmetry, 3),
             }

@@ -47,7 +47,7 @@ def kind(
     from nrdf.errors import DataError
     from nrdf.field.kind_network import load_kind_network
     from nrdf.io.atomic import write_json
-    from nrdf.scans.aligned_scan import pose_scorer
+    from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import kind as benchmark
 
     if scans_every and shapes is None:
@@ -62,7 +62,7 @@ def kind(
     if scans_every and shapes is not None:
         model = nrdf.load_model(category)
         model.kind_network = asked
-        results += benchmark.check_scans(pose_scorer(model), shapes, scans_every)
+        results += benchmark.check_scans(PoseScorer(model), shapes, scans_every)
     rows = benchmark.summary(results)
     shown = table("", category, "with a warning", "of", "share", "bar")
     for what, warned, of, bar in rows:

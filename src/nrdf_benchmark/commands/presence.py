@@ -123,6 +123,6 @@ def _open_objects(
 
 def _scorer(name: str, device: str) -> PoseScorer:
     import nrdf
-    from nrdf.scans.aligned_scan import pose_scorer
+    from nrdf.scans.pose_scorer import PoseScorer
 
-    return pose_scorer(nrdf.load_model(name, device))
+    return PoseScorer(nrdf.load_model(name, device))

@@ -44,10 +44,10 @@ def scans(
 
     import nrdf
     from nrdf.io.atomic import write_json
-    from nrdf.scans.aligned_scan import pose_scorer
+    from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark import scans as benchmark
 
-    scorer = pose_scorer(nrdf.load_model(model or category, device))
+    scorer = PoseScorer(nrdf.load_model(model or category, device))
     found = (
         [] if meshes is None else list(islice(benchmark.meshes(meshes, category), 0, None, every))
     )

@@ -20,7 +20,7 @@ from nrdf.field.general import GENERAL
 from nrdf.io.cloud import PointCloud
 from nrdf.regions.match import Match
 from nrdf.regions.model import Model
-from nrdf.scans.aligned_scan import AlignedScan, clean_and_align, pose_scorer
+from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf_benchmark.methods.learned import FieldMethod
 from nrdf_benchmark.methods.registry import METHODS, Method, MethodSpec, build_method
@@ -135,7 +135,7 @@ class ObjectRetrieval:
 
     @cached_property
     def scorer(self) -> PoseScorer:
-        return pose_scorer(self.model)
+        return PoseScorer(self.model)
 
     def regions(self, key: str) -> dict[str, np.ndarray]:
         """The parts of an object that are large enough: name to indices of its whole cloud."""

@@ -21,7 +21,6 @@ def model() -> dict[str, Callable[..., Any]]:
     from nrdf.commands.model.scan import scan
     from nrdf.commands.model.synth import synth
     from nrdf.commands.model.train import train
-    from nrdf.commands.model.yaw import yaw
 
-    every = (learn, synth, boxes, prepare, correspond, scan, train, general, yaw, kind, add)
+    every = (learn, synth, boxes, prepare, correspond, scan, train, general, kind, add)
     return {verb.__name__: verb for verb in every}

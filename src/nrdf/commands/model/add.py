@@ -19,7 +19,7 @@ def add(
     scores: tuple[Annotated[str, Metavar("NAME=VALUE")], ...] = (),
     note: str = "",
 ) -> None:
-    """Add a trained field, or a yaw or kind network, to the model zoo.
+    """Add a trained field, or a kind network, to the model zoo.
 
     Of this installation; a checkout's zoo is src/nrdf/zoo. Files over 8 MB are refused. The index
     gets the checksum, and from the file preset, training shapes with licences, commit and date.

@@ -18,8 +18,9 @@ from nrdf.geometry.canonical import bounding_box
 from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.units import METRES
 from nrdf.io.cloud import PointCloud, in_metres
-from nrdf.scans.aligned_scan import AlignedScan, clean_and_align, is_one_sided, pose_scorer
+from nrdf.scans.aligned_scan import AlignedScan, clean_and_align, is_one_sided
 from nrdf.scans.clean import STEPS, Step
+from nrdf.scans.pose_scorer import PoseScorer
 from nrdf.serve.scan_input import alignment_examples
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def place_scan(
     """
     if unit is not None and scan.unit not in (None, unit):
         raise ProcessError(f"{what}: the unit is {unit}, but the file says {scan.unit}")
-    scorer = pose_scorer(model, alignment_examples(model, reference))
+    scorer = PoseScorer(model, alignment_examples(model, reference))
     found = clean_and_align(scorer, scan, None, None, unit, skipped, number)
     known = _unit(found, what)
     cloud = found.unthinned_in_metres(known)
