@@ -30,7 +30,6 @@ FOR_MAKERS = ("model", *BENCHMARK)
 RESUMABLE = (
     "ablate", "run", "serve", "eval bsrc", "eval presence", "model boxes", "model correspond",
     "model general", "model kind", "model learn", "model prepare", "model synth", "model train",
-    "model yaw",
 )  # fmt: skip
 """Verbs that go on where they were when the same command is given again."""
 

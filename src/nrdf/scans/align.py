@@ -25,7 +25,7 @@ WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
 _REFINED = 4  # of them that are refined
-_NUDGES = np.radians([-6.0, -3.0, 0.0, 3.0, 6.0])  # where there is no mirror plane
+_TWISTS = 4  # times that a yaw is corrected where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
 SURE = 0.8
@@ -136,8 +136,8 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
     chosen = sparse_subset(working.points, _COARSE_POINTS)
     costs: np.ndarray = scorer.coarse(*_posed(working, chosen, tried)).reshape(len(ups), _YAWS)
     lap("coarse")
-    best = _minima(costs, _REFINED)
-    refined = [found for index in best for found in _refine(working, tried[index])]
+    best = [tried[index] for index in _minima(costs, _REFINED)]
+    refined = [found for one in best for found in _refine(scorer, working, chosen, one)]
     lap("mirror")
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
@@ -176,19 +176,26 @@ def _posed(
     return np.array(points), np.array([working.normals[chosen] @ f.rotation for f in frames])
 
 
-def _refine(working: _Working, found: _Hypothesis) -> list[_Hypothesis]:
-    """Hypotheses near one: both ways along the mirror plane, or a few yaws where there is none."""
-    upright_axes = upright(found.up)
-    plane = mirror_plane(
-        working.points @ upright_axes,
-        working.normals @ upright_axes,
-        rotation_about_up(found.yaw)[:, 2],
-    )
-    if plane.agreement < _SYMMETRIC:
-        return [_Hypothesis(found.up, found.yaw + nudge) for nudge in _NUDGES]
-    yaw = float(np.arctan2(plane.normal[0], plane.normal[2]))
-    exact = _Hypothesis(found.up, yaw, plane)
-    return [exact, exact.reversed()]
+def _refine(
+    scorer: PoseScorer, working: _Working, chosen: np.ndarray, found: _Hypothesis
+) -> list[_Hypothesis]:
+    """Hypotheses near one: both ways along the mirror plane, or, where there is none, the yaw in
+    which the known objects are not turned away from the cloud."""
+    for twists in range(_TWISTS + 1):
+        upright_axes = upright(found.up)
+        plane = mirror_plane(
+            working.points @ upright_axes,
+            working.normals @ upright_axes,
+            rotation_about_up(found.yaw)[:, 2],
+        )
+        if plane.agreement >= _SYMMETRIC:
+            yaw = float(np.arctan2(plane.normal[0], plane.normal[2]))
+            exact = _Hypothesis(found.up, yaw, plane)
+            return [exact, exact.reversed()]
+        if twists < _TWISTS:
+            turned = scorer.twist(*_posed(working, chosen, [found]))[0]
+            found = replace(found, yaw=found.yaw + float(turned))
+    return [found]
 
 
 def _completed(

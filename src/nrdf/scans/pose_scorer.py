@@ -45,6 +45,7 @@ PROTOTYPES = 8
 _COARSE_POINTS, _FINE_POINTS = 256, 512  # of each prototype
 _SCORED_POINTS = 1024  # of the cloud
 _TOLERANCE = 0.08  # distance at which a point counts half as explained, canonical
+_NEAR = 0.03  # added to the distance that a point's weight is inverse to
 _MOVED = 5.0  # cost of moving by a canonical length
 _SETTINGS = RegistrationSettings(iterations=8)
 _OTHER_YAWS = np.pi / 2 * np.arange(1, 4)
@@ -113,6 +114,27 @@ class PoseScorer:
         clouds (h, m, 3), completed by their mirror images where they have one, and how far it moves
         them."""
         return np.array([self._cost(*pair) for pair in zip(points, normals, strict=True)])
+
+    def twist(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """By how much h clouds (h, m, 3) in hypothesised canonical frames are turned about +Y away
+        from the prototypes, (h,), rad: of the rotations that registration contains (Procrustes
+        about one axis, points that it leaves near the cloud counting most) the median. Registration
+        bends to a heading that is 20° off, so its cost hardly tells; the rotation does."""
+        return np.array([self._twist(*pair) for pair in zip(points, normals, strict=True)])
+
+    def _twist(self, points: np.ndarray, normals: np.ndarray) -> float:
+        angles = []
+        for template in self._templates:
+            found = template.register(points, normals)
+            weight = 1.0 / (found.distance**2 + _NEAR**2)
+            own, there = (
+                (values - np.average(values, axis=0, weights=weight))[:, [2, 0]]
+                for values in (template.points, found.points)
+            )
+            along = (weight * (own * there).sum(axis=1)).sum()
+            across = (weight * (own[:, 0] * there[:, 1] - own[:, 1] * there[:, 0])).sum()
+            angles.append(np.arctan2(across, along))
+        return float(np.median(angles))
 
     def cost_of(self, target: EncodedCloud) -> float:
         """The cost of a target in the pose in which it is encoded."""
