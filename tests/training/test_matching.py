@@ -65,7 +65,7 @@ def test_local_normals_of_a_sphere_point_outward():
     points = torch.nn.functional.normalize(
         torch.randn(1, 1000, 3, generator=torch.Generator().manual_seed(0)), dim=-1
     )
-    normals = matching.local_normals(points, 16, towards=points)
+    normals = matching.local_normals(points, neighbours=16, towards=points)
     cosine = (normals * points).sum(-1)
     assert cosine.mean() > 0.99 and cosine.min() > 0.9
 
@@ -79,7 +79,7 @@ def test_local_normals_derivative_is_that_of_differences():
     probe = torch.randn(1, 30, 3, generator=generator)
 
     def value(p):
-        return (matching.local_normals(p, 30, towards=up) * probe).sum()
+        return (matching.local_normals(p, neighbours=30, towards=up) * probe).sum()
 
     (gradient,) = torch.autograd.grad(value(points), points)
     direction = torch.randn(1, 30, 3, generator=generator)

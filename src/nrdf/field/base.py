@@ -78,6 +78,15 @@ class Field(nn.Module, ABC):
     def invert(self, z: Tensor, k: Tensor) -> Inverse:
         """The points on the shapes of z (b, d_z) that descriptors k (b, m, d_k) belong to."""
 
+    def prepare(self, k: Tensor) -> Tensor:
+        """What of `invert` depends on descriptors k (b, m, d_k) alone, for several targets; k
+        itself unless a field overrides it, together with `invert_prepared`."""
+        return k
+
+    def invert_prepared(self, z: Tensor, prepared: Tensor) -> Inverse:
+        """`invert(z, k)`, where `prepared` is `prepare(k)`."""
+        return self.invert(z, prepared)
+
     def transfer(
         self, z_reference: Tensor, points: Tensor, normals: Tensor, z_target: Tensor
     ) -> Inverse:

@@ -6,7 +6,7 @@ the descriptor θ, C maps a descriptor and the target's embedding to a point of 
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Iterator
 from typing import ClassVar
 
 import torch
@@ -14,6 +14,14 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from nrdf.field.base import Field, FieldConfig, Inverse
+from nrdf.field.point_nets import (
+    ConvolutionPointNet,
+    ResidualBlock,
+    ResidualPointNet,
+    UnitLength,
+    exact_linear,
+    working_precision,
+)
 
 
 class PaperConfig(FieldConfig):
@@ -65,16 +73,23 @@ class PaperField(Field):
         return self.encoder(points)
 
     def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
-        return self.decoder(z, queries)[1][..., -1]
+        return self.decoder.logit(z, queries)
 
     def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> Tensor:
         """k = [point features, z, activations of B, logit], of unit length (b, m, 1953)."""
         features, activations = self.decoder(z, points)
         constant = z[:, None].expand(-1, points.shape[1], -1).to(features.dtype)
-        return functional.normalize(torch.cat([features, constant, activations], dim=-1), dim=-1)
+        raw = torch.cat([features, constant, activations], dim=-1)
+        return UnitLength.apply(raw)  # type: ignore[no-any-return]
 
     def invert(self, z: Tensor, k: Tensor) -> Inverse:
-        return Inverse(self.inverse(z, k))
+        return self.invert_prepared(z, self.prepare(k))
+
+    def prepare(self, k: Tensor) -> Tensor:
+        return self.inverse.on_descriptor(k)
+
+    def invert_prepared(self, z: Tensor, prepared: Tensor) -> Inverse:
+        return Inverse(self.inverse(z, prepared))
 
     def transfer(
         self, z_reference: Tensor, points: Tensor, normals: Tensor, z_target: Tensor
@@ -98,55 +113,6 @@ class Encoder(nn.Module):
         return torch.cat([self.residual(points), self.convolution(points)], dim=-1)
 
 
-class ResidualPointNet(nn.Module):
-    """PointNet of residual blocks; between them each point sees the maximum over all points.
-
-    As the point cloud encoder of Occupancy Networks (Mescheder et al., CVPR 2019).
-    """
-
-    def __init__(self, width: int, blocks: int) -> None:
-        super().__init__()
-        self.enter = nn.Linear(3, 2 * width)
-        self.blocks = nn.ModuleList(ResidualBlock(2 * width, width) for _ in range(blocks))
-        self.leave = nn.Linear(width, width)
-
-    def forward(self, points: Tensor) -> Tensor:
-        """(b, width) of points (b, n, 3)."""
-        x = self.enter(points)
-        pooled = x
-        for number, block in enumerate(self.blocks):
-            if number:
-                x = torch.cat([x, pooled.expand_as(x)], dim=-1)
-            x = block(x)
-            pooled = x.max(dim=1, keepdim=True).values
-        return self.leave(functional.relu(pooled.squeeze(1)))
-
-
-class ConvolutionPointNet(nn.Module):
-    """PointNet (Qi et al., CVPR 2017) without its transforms: 64-64-64-128-1024, 512, out.
-
-    Batch normalisation after each convolution, as there; not after the two layers behind the
-    pooling, because the third stage's batches hold two shapes.
-    """
-
-    def __init__(self, length: int) -> None:
-        super().__init__()
-        widths = (3, 64, 64, 64, 128, 1024)
-        self.convolutions = nn.ModuleList(
-            nn.Conv1d(size, width, 1) for size, width in pairwise(widths)
-        )
-        self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths[1:])
-        self.middle = nn.Linear(widths[-1], 512)
-        self.leave = nn.Linear(512, length)
-
-    def forward(self, points: Tensor) -> Tensor:
-        """(b, length) of points (b, n, 3)."""
-        x = points.transpose(1, 2)
-        for convolution, norm in zip(self.convolutions, self.norms, strict=True):
-            x = functional.relu(norm(convolution(x)))
-        return self.leave(functional.relu(self.middle(x.max(dim=2).values)))
-
-
 class Decoder(nn.Module):
     """B: occupancy from a point's 32 features beside z, through 5 residual blocks of 256."""
 
@@ -162,17 +128,32 @@ class Decoder(nn.Module):
 
     def forward(self, z: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
         """Point features (b, q, 32) and activations (b, q, 1537), whose last is the logit."""
-        features = self.lift(points)
-        # [features, z] times the weights, the part that z has in it once for each object.
-        on_features, on_z = self.enter.weight.split([features.shape[-1], z.shape[-1]], dim=1)
-        x = functional.linear(features, on_features, self.enter.bias)
-        x = x + functional.linear(z, on_z)[:, None]
-        activations = [x]
+        features = exact_linear(points, self.lift.weight, self.lift.bias)
+        layers = list(self._layers(z, points))
+        return working_precision(features), torch.cat([*layers, self._logit(layers[-1])], dim=-1)
+
+    def logit(self, z: Tensor, points: Tensor) -> Tensor:
+        """The logits (b, q) alone: nothing is kept of the layers before."""
+        for layer in self._layers(z, points):
+            x = layer
+        return self._logit(x)[..., 0]
+
+    def _logit(self, x: Tensor) -> Tensor:
+        return self.leave(functional.relu(x))
+
+    def _layers(self, z: Tensor, points: Tensor) -> Iterator[Tensor]:
+        """What the first layer and every block make of points (b, q, 3): (b, q, 256) each."""
+        # W [F p + f, z] = (W_f F) p + W_f f + W_z z: the last two once for each object.
+        on_features, on_z = self.enter.weight.split([self.lift.out_features, z.shape[-1]], dim=1)
+        constant = exact_linear(z, on_z, self.enter.bias)
+        constant = constant + exact_linear(self.lift.bias, on_features)
+        with torch.autocast(points.device.type, enabled=False):
+            on_points = on_features @ self.lift.weight
+        x = working_precision(exact_linear(points, on_points) + constant[:, None])
+        yield x
         for block in self.blocks:
             x = block(x)
-            activations.append(x)
-        activations.append(self.leave(functional.relu(x)))
-        return features, torch.cat(activations, dim=-1)
+            yield x
 
 
 class InverseDescriptor(nn.Module):
@@ -192,11 +173,15 @@ class InverseDescriptor(nn.Module):
         )
         self.leave = nn.Linear(third, 3)
 
-    def forward(self, z: Tensor, k: Tensor) -> Tensor:
-        """Points (b, m, 3) on the targets of z (b, 384) for descriptors k (b, m, 1953)."""
-        on_z, on_k = self.enter.weight.split([z.shape[-1], k.shape[-1]], dim=1)
-        constant = functional.linear(z, on_z, self.enter.bias)
-        return self._rest(functional.linear(k, on_k) + constant[:, None])
+    def on_descriptor(self, k: Tensor) -> Tensor:
+        """The share of descriptors k (b, m, 1953) in the first layer (b, m, 1024): the same for
+        every target."""
+        return functional.linear(k, self.enter.weight[:, -k.shape[-1] :])
+
+    def forward(self, z: Tensor, on_k: Tensor) -> Tensor:
+        """Points (b, m, 3) on the targets of z (b, 384), of what `on_descriptor` gives."""
+        constant = functional.linear(z, self.enter.weight[:, : z.shape[-1]], self.enter.bias)
+        return self._rest(on_k + constant[:, None])
 
     def from_parts(
         self, z_target: Tensor, z_reference: Tensor, features: Tensor, activations: Tensor
@@ -230,19 +215,5 @@ class InverseDescriptor(nn.Module):
     def _rest(self, x: Tensor) -> Tensor:
         for block in self.blocks:
             x = block(x)
-        return self.leave(functional.leaky_relu(x, 0.02)).tanh()
-
-
-class ResidualBlock(nn.Module):
-    """x + W2 relu(W1 relu(x)), with a linear shortcut where the width changes (…, width)."""
-
-    def __init__(self, size: int, width: int) -> None:
-        super().__init__()
-        hidden = min(size, width)
-        self.inner = nn.Linear(size, hidden)
-        self.outer = nn.Linear(hidden, width)
-        self.shortcut = nn.Identity() if size == width else nn.Linear(size, width, bias=False)
-        nn.init.zeros_(self.outer.weight)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.shortcut(x) + self.outer(functional.relu(self.inner(functional.relu(x))))
+        x = functional.leaky_relu(x, 0.02)
+        return exact_linear(x, self.leave.weight, self.leave.bias).tanh()

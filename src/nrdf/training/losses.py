@@ -22,12 +22,15 @@ from nrdf.training.matching import (
     distances,
     distances_to,
     local_normals,
+    nearest_both_ways,
     nearest_distance,
     nearest_indices,
 )
 
 ROBUST = 0.01
 """Distance (canonical) below which `correspondence` turns from linear to quadratic."""
+PATCHES = 128
+"""Points of each cloud, drawn anew in every step, around which smoothness and normals are taken."""
 
 
 class LossContext:
@@ -75,6 +78,17 @@ class LossContext:
         return self.field.describe(self.z, self.cloud, self.cloud_normals)
 
     @cached_property
+    def prepared(self) -> Tensor:
+        """What self and cross reconstruction make of the descriptors alike."""
+        return self.field.prepare(self.descriptors)
+
+    @cached_property
+    def patches(self) -> Tensor:
+        """(r,) rows of the clouds around which patches are taken."""
+        rows = torch.randperm(self.cloud_points, generator=self.generator, device=self.z.device)
+        return rows[:PATCHES]
+
+    @cached_property
     def partner(self) -> Tensor:
         """(b,) every shape's first partner."""
         return self.batch.partner[: len(self.cloud)]
@@ -82,12 +96,13 @@ class LossContext:
     @cached_property
     def self_reconstruction(self) -> Tensor:
         """(b, c, 3) each cloud from its own descriptors."""
-        return self.field.invert(self.z, self.descriptors).points.float()
+        return self.field.invert_prepared(self.z, self.prepared).points.float()
 
     @cached_property
     def cross_reconstruction(self) -> Tensor:
         """(b, c, 3) each shape's descriptors on its partner."""
-        return self.field.invert(self.z[self.partner], self.descriptors).points.float()
+        z = self.z[self.partner]
+        return self.field.invert_prepared(z, self.prepared).points.float()
 
 
 def chamfer_distance(a: Tensor, b: Tensor) -> Tensor:
@@ -113,12 +128,11 @@ def robust_distance(points: Tensor, batch: Batch) -> Tensor:
 
 
 def roughness(context: LossContext, values: Tensor) -> Tensor:
-    """Mean of ‖v(x) − v(y)‖ over 512 random points x of each cloud and their 16 nearest y within
-    0.1; values v (b, c, d) at the clouds' points."""
-    c = context.cloud_points
-    rows = torch.randperm(c, generator=context.generator, device=context.cloud.device)[:512]
+    """Mean of ‖v(x) − v(y)‖ over random points x of each cloud and their 16 nearest y within 0.1;
+    values v (b, c, d) at the clouds' points."""
+    rows = context.patches
     apart, around = distances(context.cloud[:, rows], context.cloud).topk(
-        min(17, c), dim=2, largest=False, sorted=True
+        min(17, context.cloud_points), dim=2, largest=False, sorted=True
     )
     apart, around = apart[:, :, 1:], around[:, :, 1:]
     return weighted_mean(distances_to(values, rows, around), (apart < 0.1).float())
@@ -147,7 +161,7 @@ def emd(context: LossContext) -> Tensor:
 
 
 def descriptor_smoothness(context: LossContext) -> Tensor:
-    """(6): mean of ‖k(x) − k(y)‖ over 512 random points x and their 16 nearest y within 0.1.
+    """(6): mean of ‖k(x) − k(y)‖ over random points x and their 16 nearest y within 0.1.
 
     The paper permutes the points of random patches, and compares each with its neighbour in the
     new order; this compares every centre with all of its patch.
@@ -156,16 +170,15 @@ def descriptor_smoothness(context: LossContext) -> Tensor:
 
 
 def normal_consistency(context: LossContext) -> Tensor:
-    """(5): mean of 1 − n(x)·n(y) over cross-reconstructed x and their nearest y on shape j; n(x)
-    by local PCA, its sign from the normal that x had on shape i.
+    """(5): mean of 1 − n(x)·n(y) over random cross-reconstructed x and their nearest y on shape j;
+    n(x) by local PCA, its sign from the normal that x had on shape i.
 
     The paper adds the other direction, from shape j to the reconstruction.
     """
-    ours = local_normals(context.cross_reconstruction, towards=context.cloud_normals)
-    theirs = gather(
-        context.cloud_normals[context.partner],
-        nearest_indices(context.cross_reconstruction, context.cloud[context.partner]),
-    )
+    crossed, rows = context.cross_reconstruction, context.patches
+    ours = local_normals(crossed, rows, towards=context.cloud_normals[:, rows])
+    nearest = nearest_indices(crossed[:, rows], context.cloud[context.partner])
+    theirs = gather(context.cloud_normals[context.partner], nearest)
     return (1 - (ours * theirs).sum(-1)).mean()
 
 
@@ -180,8 +193,8 @@ def descriptor_distance(context: LossContext) -> Tensor:
     ours = context.field.describe(
         context.z[context.partner], context.cross_reconstruction, context.cloud_normals
     )
-    theirs = context.descriptors
-    return (nearest_distance(ours, theirs).mean() + nearest_distance(theirs, ours).mean()) / 2
+    there, back = nearest_both_ways(ours, context.descriptors)
+    return (there.mean() + back.mean()) / 2
 
 
 def displacement_smoothness(context: LossContext) -> Tensor:

@@ -65,6 +65,28 @@ def nearest_distance(query: Tensor, reference: Tensor, squared: bool = False) ->
     return square if squared else (square + 1e-12).sqrt()
 
 
+def nearest_both_ways(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
+    """Distance (b, n) from each of a (b, n, d) to its nearest in b (b, m, d), and (b, m) from each
+    of b to its nearest in a; d is large.
+
+    Which are nearest is found for both at once, without gradient, in the precision that the values
+    have.
+    """
+    with torch.no_grad():
+        # What all have in common would drown the differences in the product's rounding.
+        common = b.float().mean(dim=1, keepdim=True)
+        x, y = (a - common).to(a.dtype), (b - common).to(b.dtype)
+        apart = (x @ y.transpose(1, 2)).float().mul_(-2)
+        apart += x.float().square().sum(-1)[..., None]
+        apart += y.float().square().sum(-1)[:, None]
+        there, back = apart.min(dim=2).indices, apart.min(dim=1).indices
+
+    def measure(difference: Tensor) -> Tensor:
+        return (difference.float().square().sum(-1) + 1e-12).sqrt()
+
+    return measure(a - gather(b, there)), measure(b - gather(a, back))
+
+
 def distances_to(values: Tensor, rows: Tensor, others: Tensor) -> Tensor:
     """Distances (b, r, k) from values (b, c, d) at `rows` (r,) to those at `others` (b, r, k).
 
@@ -80,16 +102,23 @@ def distances_to(values: Tensor, rows: Tensor, others: Tensor) -> Tensor:
     return (square.gather(2, others).clamp_min(0) + 1e-12).sqrt()
 
 
-def local_normals(points: Tensor, neighbours: int = 16, towards: Tensor | None = None) -> Tensor:
-    """Unit normals (b, n, 3) of points (b, n, 3) from the plane through their neighbours.
+def local_normals(
+    points: Tensor,
+    rows: Tensor | None = None,
+    neighbours: int = 16,
+    towards: Tensor | None = None,
+) -> Tensor:
+    """Unit normals (b, r, 3) of points (b, n, 3), of those at `rows` (r,) if given, from the plane
+    through their neighbours.
 
     The normal is the covariance's eigenvector of least eigenvalue. Its derivative is written as
     first-order perturbation with the eigenvalue gaps bounded from below, because the derivative
     of `eigh` is infinite where two eigenvalues meet (lines, corners). Signs are those that agree
-    with `towards` (b, n, 3), or arbitrary.
+    with `towards` (b, r, 3), or arbitrary.
     """
     points = points.float()
-    indices = neighbour_indices(points, points, min(neighbours, points.shape[1]))
+    asked = points if rows is None else points[:, rows]
+    indices = neighbour_indices(asked, points, min(neighbours, points.shape[1]))
     around = gather(points, indices)
     around = around - around.mean(dim=2, keepdim=True)
     covariance = around.transpose(2, 3) @ around

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from nrdf.field.base import Field, FieldConfig, Inverse
-from nrdf.field.paper import ConvolutionPointNet
+from nrdf.field.point_nets import ConvolutionPointNet, exact_linear, working_precision
 
 _SLOPE = 0.02  # of every leaky ReLU
 
@@ -30,7 +30,7 @@ class IMDCConfig(FieldConfig):
 
 
 class IMDCField(Field):
-    """z (b, 256), k (b, m, 12) in [0, 1]: the part embedding; 2.9 million parameters.
+    """z (b, 256), k (b, m, 12) in [0, 1]: the part embedding; 4.6 million parameters.
 
     Normals are not used. The encoder is the one of the `paper` preset's convolutional half: that
     of IMDC's authors, but with batch normalisation, without which it learns little in few steps.
@@ -72,9 +72,12 @@ class BranchedImplicit(nn.Module):
 
     def forward(self, z: Tensor, points: Tensor) -> Tensor:
         """Logits (b, q, branches) at points (b, q, 3)."""
-        x = self.on_points(points) + self.on_z(z)[:, None]
-        x = self.middle(functional.leaky_relu(x, _SLOPE))
-        return self.leave(functional.leaky_relu(x, _SLOPE))
+        x = exact_linear(points, self.on_points.weight, self.on_points.bias)
+        x = working_precision(x) + self.on_z(z)[:, None]
+        x = self.middle(functional.leaky_relu_(x, _SLOPE))
+        # All that the inverse learns of a place is in these few values.
+        x = functional.leaky_relu_(x, _SLOPE)
+        return exact_linear(x, self.leave.weight, self.leave.bias)
 
 
 class InverseImplicit(nn.Module):
@@ -91,13 +94,15 @@ class InverseImplicit(nn.Module):
 
     def forward(self, z: Tensor, k: Tensor) -> Tensor:
         """Points (b, m, 3) of part embeddings k (b, m, branches) on the shapes of z."""
-        x = functional.leaky_relu(self.enter(k, z), _SLOPE)
+        x = exact_linear(k, self.enter.on_x.weight, self.enter.on_x.bias)
+        x = functional.leaky_relu_(working_precision(x) + self.enter.on_z(z)[:, None], _SLOPE)
         for layer in self.before:
-            x = functional.leaky_relu(layer(x), _SLOPE)
-        x = functional.leaky_relu(self.again(torch.cat([x, k.to(x.dtype)], dim=-1), z), _SLOPE)
+            x = functional.leaky_relu_(layer(x), _SLOPE)
+        x = self.again(torch.cat([x, k.to(x.dtype)], dim=-1), z)
+        x = functional.leaky_relu_(x, _SLOPE)
         for layer in self.after:
-            x = functional.leaky_relu(layer(x), _SLOPE)
-        return self.leave(x).tanh()
+            x = functional.leaky_relu_(layer(x), _SLOPE)
+        return exact_linear(x, self.leave.weight, self.leave.bias).tanh()
 
 
 class _Conditioned(nn.Module):
