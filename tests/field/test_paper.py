@@ -123,3 +123,27 @@ def test_the_embedding_does_not_depend_on_the_order_of_points(field):
     assert torch.allclose(
         field.embed(points, normals), field.embed(points[:, order], normals[:, order]), atol=1e-5
     )
+
+
+def test_the_logit_alone_is_that_of_the_descriptor(field):
+    points, normals = cloud(2, 20)
+    with torch.no_grad():
+        z = field.embed(points, normals)
+        assert torch.allclose(field.decoder(z, points)[1][..., -1], field.occupancy(z, points))
+
+
+def test_a_prepared_descriptor_serves_several_targets(field):
+    points, normals = cloud(2, 20)
+    with torch.no_grad():
+        z = field.embed(points, normals)
+        k = field.describe(z, points, normals)
+        prepared = field.prepare(k)
+        for target in (z, z.flip(0)):
+            beside = torch.cat([target[:, None].expand(-1, 20, -1), k], dim=-1)
+            x = field.inverse.enter(beside)
+            for block in field.inverse.blocks:
+                x = block(x)
+            expected = field.inverse.leave(functional.leaky_relu(x, 0.02)).tanh()
+            found = field.invert_prepared(target, prepared).points
+            assert torch.allclose(found, expected, atol=1e-4)
+            assert torch.equal(found, field.invert(target, k).points)

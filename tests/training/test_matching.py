@@ -125,3 +125,21 @@ def test_assignment_of_a_cloud_to_its_shuffle_is_the_shuffle():
 def test_assignment_refuses_unequal_sizes(clouds):
     with pytest.raises(ValueError, match="equal sizes"):
         matching.assign(*clouds)
+
+
+def test_nearest_both_ways_equals_one_way_after_the_other():
+    generator = torch.Generator().manual_seed(0)
+    a, b = (torch.randn(2, n, 40, generator=generator) + 5 for n in (9, 12))
+    there, back = matching.nearest_both_ways(a, b)
+    assert torch.allclose(there, matching.nearest_distance(a, b), atol=1e-4)
+    assert torch.allclose(back, matching.nearest_distance(b, a), atol=1e-4)
+
+
+def test_normals_of_some_points_are_those_of_all():
+    points = torch.nn.functional.normalize(
+        torch.randn(2, 200, 3, generator=torch.Generator().manual_seed(0)), dim=-1
+    )
+    rows = torch.tensor([5, 17, 80])
+    every = matching.local_normals(points, towards=points)
+    some = matching.local_normals(points, rows, towards=points[:, rows])
+    assert torch.allclose(some, every[:, rows], atol=1e-6)

@@ -121,13 +121,16 @@ class ConvolutionPointNet(nn.Module):
     def forward(self, points: Tensor) -> Tensor:
         """(b, length) of points (b, n, 3)."""
         x = points.flatten(0, 1)
-        layers = list(zip(self.convolutions, self.norms, strict=True))
-        for number, (convolution, norm) in enumerate(layers[:-1]):
-            weight = convolution.weight.squeeze(-1)
+        for number, (convolution, norm) in enumerate(
+            zip(self.convolutions, self.norms, strict=True)
+        ):
+            assert isinstance(convolution, nn.Conv1d) and isinstance(norm, nn.BatchNorm1d)
+            if number == len(self.norms) - 1:
+                break
             multiply = functional.linear if number else exact_linear
-            x = working_precision(multiply(x, weight, convolution.bias))
+            x = working_precision(multiply(x, convolution.weight.squeeze(-1), convolution.bias))
             x = norm(x).relu_()
-        pooled = _pooled_layer(x.unflatten(0, points.shape[:2]), *layers[-1])
+        pooled = _pooled_layer(x.unflatten(0, points.shape[:2]), convolution, norm)
         return self.leave(functional.relu(self.middle(pooled)))
 
 

@@ -61,7 +61,8 @@ def bsrc(
         method: Methods to run, rows of the table.
         model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
             is for those of the default field, which otherwise have the category's model in the zoo.
-        runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper.
+        runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper;
+            what is not there comes with the benchmark, where it is small enough.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
         metric: Metric of the table: cd-l1, chamfer-l1, squared-cd, f-score-0.01, f-score-0.02,
             precision, recall, iou or side-accuracy.

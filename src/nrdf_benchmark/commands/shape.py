@@ -39,7 +39,8 @@ def shape(
         method: Methods to score, rows of the table: nrdf, nrdf-paper, ndf, imdc.
         model: METHOD=PATH of a weight file or run; a zoo name or path alone is for nrdf, which
             otherwise has the category's model in the zoo.
-        runs: Where the others were trained: RUNS/CATEGORY-PRESET, presets paper, ndf, imdc.
+        runs: Where the others were trained: RUNS/CATEGORY-PRESET, presets paper, ndf, imdc;
+            what is not there comes with the benchmark, where it is small enough.
         split: Which shapes to score: test, val or train.
         level: Occupancy of the surface.
         resolution: Nodes of the grid along each axis.

@@ -13,6 +13,7 @@ from nrdf.io.bounds import Count, NonNegativeCount
 if TYPE_CHECKING:
     from nrdf_benchmark.speed.large import LargeTransfer
     from nrdf_benchmark.speed.measure import Failure
+    from nrdf_benchmark.speed.plain_steps import StepComparison
     from nrdf_benchmark.speed.retrieval import RetrievalSpeed
     from nrdf_benchmark.speed.training import TrainingSpeed
     from nrdf_benchmark.speed.transfer import TransferSpeed
@@ -24,6 +25,8 @@ def speed(
     device: str = "cpu",
     repeats: Count = 7,
     steps: NonNegativeCount = 3,
+    plain: tuple[str, ...] = (),
+    threads: tuple[int, ...] = (1, 2),
     out: File | None = None,
 ) -> None:
     """Measure speed and memory of retrieval, transfer and training.
@@ -39,14 +42,29 @@ def speed(
         device: cpu, cuda, cuda:N or auto.
         repeats: Warm retrievals, of which the median is taken.
         steps: Training steps a stage, of which the median is taken; 0 leaves training out.
+        plain: Configurations of the paper's network (paper-short) whose training steps are
+            compared with a plain reading of the paper's modules, and nothing else is measured.
+        threads: With --plain, on so many threads, one after the other.
         out: JSON file to write.
     """
     from nrdf.io.atomic import write_json
     from nrdf_benchmark.speed.common import in_new_process
     from nrdf_benchmark.speed.large import KINDS, measure_large
     from nrdf_benchmark.speed.measure import measure, to_json
+    from nrdf_benchmark.speed.plain_steps import compare_steps
     from nrdf_benchmark.speed.transfer import measure_transfer
 
+    if plain:
+        compared = [
+            one
+            for name in plain
+            for count in threads
+            for one in in_new_process(compare_steps, name, count, steps)
+        ]
+        show_comparisons(compared)
+        if out is not None:
+            write_json(out, {"versions": versions(), "plain": [vars(one) for one in compared]})
+        return
     with errors.status("measuring") as status:
         retrieval, training, failures = measure(preset, device, repeats, steps, status.update)
         status.update("transfer")
@@ -63,6 +81,23 @@ def speed(
         content["large"] = [vars(one) for one in large]
         write_json(out, {"versions": versions(), **content})
         console.print(f"wrote {out}")
+
+
+def show_comparisons(compared: Sequence[StepComparison]) -> None:
+    """A table of training steps, ours and the plain reading's side by side."""
+    shown = table(
+        "training steps beside a plain reading, equal work", "preset", "stage", "threads",
+        "shapes", "points, queries, cloud", "steps/s", "plain", "times", "CPU s", "plain", "times",
+    )  # fmt: skip
+    for one in compared:
+        shown.add_row(
+            one.preset, one.stage, str(one.threads), str(one.shapes),
+            f"{one.points}, {one.queries}, {one.cloud_points}",
+            f"{1 / one.step_s:.2f}", f"{1 / one.plain_step_s:.2f}",
+            f"{one.plain_step_s / one.step_s:.1f}",
+            f"{one.cpu_s:.2f}", f"{one.plain_cpu_s:.2f}", f"{one.plain_cpu_s / one.cpu_s:.1f}",
+        )  # fmt: skip
+    show(shown)
 
 
 def show_transfer_speed(transfer: TransferSpeed) -> None:

@@ -22,6 +22,9 @@ import numpy as np
 from nrdf.errors import ConfigError, ModelError, unknown_name
 from nrdf.io.cloud import PointCloud
 
+ZOO = Path(__file__).resolve().parents[1] / "zoo"
+"""The rivals' weights that ship with the benchmark, CATEGORY-PRESET.safetensors: those that are
+small enough."""
 Found = dict[str, np.ndarray]
 Method = Callable[[PointCloud, Mapping[str, Any], PointCloud], Found]
 
@@ -83,7 +86,8 @@ def find_methods(
     """The methods of some names, in their order, with the weights that they need for a category.
 
     models: METHOD=PATH for single methods, or a zoo name or path alone for those of the default
-    field. Weights of others are looked for in `runs`/CATEGORY-PRESET. Raises ConfigError for a name
+    field. Weights of others are looked for in `runs`/CATEGORY-PRESET, then in the benchmark's own
+    `ZOO`. Raises ConfigError for a name
     that is not known or given twice, ModelError for weights that are not there or of another
     category or preset, naming the file.
     """
@@ -179,14 +183,16 @@ def _trained(name: str, entry: Entry, category: str, runs: Path) -> Path:
     from nrdf.field.zoo import WEIGHTS
 
     run = runs / f"{category}-{entry.run}"
-    path = run / WEIGHTS
-    if not path.is_file():
-        raise ModelError(
-            f"no weights of method '{name}' for category {category}: expected {path}; train them "
-            f"(nrdf model train {category} --preset {entry.run}-short --data data/{category} --out "
-            f"{run}), give the folder of the runs (--runs) or the file (--model {name}=PATH)"
-        )
-    return path
+    places = (run / WEIGHTS, ZOO / f"{category}-{entry.run}.safetensors")
+    for path in places:
+        if path.is_file():
+            return path
+    raise ModelError(
+        f"no weights of method '{name}' for category {category}: expected {places[0]} or "
+        f"{places[1]}; train them (nrdf model train {category} --preset {entry.run}-short --data "
+        f"data/{category} data/{category}-family --out {run}), give the folder of the runs "
+        f"(--runs) or the file (--model {name}=PATH)"
+    )
 
 
 def _sha256(path: Path) -> str:

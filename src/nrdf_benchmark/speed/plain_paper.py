@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from nrdf.field.paper import PaperField
+from nrdf.field.point_nets import ResidualBlock
 from nrdf.training.batch import Batch
 from nrdf.training.losses import PATCHES
 from nrdf.training.matching import local_normals
@@ -115,5 +116,6 @@ class PlainPaper:
         return inverse.leave(functional.leaky_relu(x, 0.02)).tanh()
 
     def _block(self, block: torch.nn.Module, x: Tensor) -> Tensor:
-        inner, outer, shortcut = block.inner, block.outer, block.shortcut
-        return shortcut(x) + outer(functional.relu(inner(functional.relu(x))))
+        assert isinstance(block, ResidualBlock)
+        hidden = functional.relu(block.inner(functional.relu(x)))
+        return block.shortcut(x) + block.outer(hidden)

@@ -43,7 +43,9 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
     config = load_config(preset)
     chosen = choose_device(device)
     largest = max(stage.batch_size for stage in config.stages)
-    dataset = ShapeDataset(_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen)
+    dataset = ShapeDataset(
+        training_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen
+    )
     precision = choose_precision(config.precision, chosen)
     field = build_field(config.preset, config.field).to(chosen)
     speeds = []
@@ -82,7 +84,7 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
     return speeds
 
 
-def _shapes(count: int) -> list[Shape]:
+def training_shapes(count: int) -> list[Shape]:
     """Training shapes: few, under many names, since what is in them does not change the cost."""
     surface = get_family(CATEGORY).member(1).sample_surface(4096, np.random.default_rng(0))
     made = [member_shape(CATEGORY, seed, surface.coordinates) for seed in range(2, 5)]

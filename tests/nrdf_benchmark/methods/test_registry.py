@@ -14,6 +14,7 @@ from nrdf.errors import ConfigError, ModelError
 from nrdf.field import build_field
 from nrdf.field.weights import save_weights
 from nrdf.io.cloud import PointCloud
+from nrdf_benchmark.methods import registry
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method, find_methods
 
 SIZES = {
@@ -66,16 +67,29 @@ def test_rivals_come_from_the_runs_unless_a_model_is_given(tmp_path):
     assert spec.weights == other.resolve()
 
 
+def test_rivals_that_were_not_trained_here_come_from_the_benchmarks_zoo(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "ZOO", tmp_path)
+    shipped = save(tmp_path / "chair-ndf.safetensors", "ndf")
+    (spec,) = find_methods(["ndf"], "chair", runs=tmp_path / "runs")
+    assert spec.weights == shipped.resolve()
+    trained = save(tmp_path / "runs" / "chair-ndf" / "weights.safetensors", "ndf")
+    (spec,) = find_methods(["ndf"], "chair", runs=tmp_path / "runs")
+    assert spec.weights == trained.resolve()
+
+
 @pytest.mark.parametrize(
     "name, run", [("ndf", "ndf"), ("ndf-energy", "ndf"), ("imdc", "imdc"), ("nrdf-paper", "paper")]
 )
-def test_missing_weights_are_named_with_the_command_that_makes_them(tmp_path, name, run):
+def test_missing_weights_are_named_with_the_command_that_makes_them(
+    tmp_path, monkeypatch, name, run
+):
+    monkeypatch.setattr(registry, "ZOO", tmp_path / "zoo")
     with pytest.raises(ModelError) as raised:
         find_methods(["copy", name], "plane", runs=tmp_path)
     said = str(raised.value)
     assert f"no weights of method '{name}' for category plane: expected {tmp_path}" in said
     assert f"plane-{run}/weights.safetensors" in said
-    assert f"nrdf model train plane --preset {run}-short --data data/plane --out {tmp_path}" in said
+    assert f"nrdf model train plane --preset {run}-short --data data/plane data/plane-f" in said
 
 
 def test_weights_of_another_category_or_preset_are_refused(tmp_path):
