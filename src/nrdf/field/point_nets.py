@@ -68,6 +68,7 @@ class ResidualBlock(nn.Module):
         if constant is None:
             hidden = self.inner(functional.relu(x)).relu_()
             return self.shortcut(x) + self.outer(hidden)
+        assert isinstance(self.shortcut, nn.Linear)
         parts = [x.shape[-1], constant.shape[-1]]
         on_x, on_constant = self.inner.weight.split(parts, dim=1)
         rest = functional.linear(functional.relu(constant), on_constant, self.inner.bias)
@@ -121,16 +122,14 @@ class ConvolutionPointNet(nn.Module):
     def forward(self, points: Tensor) -> Tensor:
         """(b, length) of points (b, n, 3)."""
         x = points.flatten(0, 1)
-        for number, (convolution, norm) in enumerate(
-            zip(self.convolutions, self.norms, strict=True)
-        ):
+        for convolution, norm in zip(self.convolutions, self.norms, strict=True):
             assert isinstance(convolution, nn.Conv1d) and isinstance(norm, nn.BatchNorm1d)
-            if number == len(self.norms) - 1:
-                break
-            multiply = functional.linear if number else exact_linear
-            x = working_precision(multiply(x, convolution.weight.squeeze(-1), convolution.bias))
-            x = norm(x).relu_()
-        pooled = _pooled_layer(x.unflatten(0, points.shape[:2]), convolution, norm)
+            if norm is self.norms[-1]:
+                pooled = _pooled_layer(x.unflatten(0, points.shape[:2]), convolution, norm)
+            else:
+                multiply = exact_linear if convolution.in_channels == 3 else functional.linear
+                x = multiply(x, convolution.weight.squeeze(-1), convolution.bias)
+                x = norm(working_precision(x)).relu_()
         return self.leave(functional.relu(self.middle(pooled)))
 
 

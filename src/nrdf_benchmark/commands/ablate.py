@@ -47,7 +47,7 @@ def ablate(
         category: What the shapes are; chair, car or plane with --bsrc.
         data: Data folders (of `nrdf model prepare` or `nrdf model synth`).
         schedule: short (for a CPU) or full (the paper's, for a GPU); what they cost stands in
-            docs/evidence/bsrc.md.
+            docs/evidence/paper-tables.md.
         config: A configuration file of your own instead; its last stage is the one that loses
             a loss.
         only: The variants to train and score; by the paper's abbreviations, CD (Chamfer
