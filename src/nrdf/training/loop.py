@@ -301,9 +301,7 @@ def make_optimizer(
 ) -> torch.optim.Optimizer:
     """A fresh optimizer, as every stage starts with."""
     kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
-    return kind(
-        parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay, fused=True
-    )
+    return kind(parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay)
 
 
 @contextmanager
