@@ -95,10 +95,11 @@ def looks(editor: Editor, results: ResultCache) -> None:
         ("sanding, raster", "seat", 30.0, {}),
         ("polishing, cross-hatch", "back-front", 24.0, {}),
         ("a film", "seat", 40.0, {
-            "kind": "paint", "tool": film, "standoff_m": 0.15, "feed_m_s": 0.3, "force_n": None,
-            "thickness_um": {"value": 60.0, "tolerance": 6.0}}),
+            "tool": film, "standoff_m": 0.15, "thickness_um": {"value": 60.0, "tolerance": 6.0}}),
     ):  # fmt: skip
-        editor.change_step(region, 0, **step)
+        if step:
+            editor.restart_step(region, 0, "paint")
+            editor.change_step(region, 0, **step)
         results.make_plans(editor.document, silent)
         mesh = results.shown_mesh(editor.document.region(region))
         spent = []
@@ -106,7 +107,9 @@ def looks(editor: Editor, results: ResultCache) -> None:
             editor.change_numbers(region, 0, {"stepover_mm": first + float(moved)})
             document = editor.document
             spent.append(took(lambda: results.look(document, region, 0, silent), 1))  # noqa: B023
-        assert mesh is not None and results.shown_plan(editor.document.region(region), 0)
+        shown = results.shown_plan(editor.document.region(region), 0)
+        assert mesh is not None and shown is not None and not shown.fault, shown
+        assert (shown.left is not None) == bool(step), "what it leaves"
         print(
             f"a first look, {what}, {len(mesh.faces)} triangles: "
             f"median {np.median(spent):.2f} s, longest {max(spent):.2f} s"
