@@ -28,8 +28,8 @@ _LIBRARY, _TURNS = 40_000, 12  # poses to begin from, as `nrdf simulate` has; tu
 
 @dataclass(frozen=True)
 class Execution:
-    """Of one plan. metrics: of what the arm left; reached: share of the waypoints, of lines and
-    run-ups, that it came to."""
+    """Of one plan. metrics: of what the arm left; reached: share of the waypoints with the gun on
+    that it came to."""
 
     metrics: ResultMetrics
     reached: float
@@ -70,5 +70,6 @@ def execute_on_arm(
     motion = executed_motion(cell, done.logs, still)
     cells = planned.model.cells
     values = executed_values(cells, motion, tool, mesh)
-    reached = float(np.concatenate(covered).mean())
+    worked = np.concatenate([group.process.applies for group in path.groups])
+    reached = float(np.concatenate(covered)[worked].mean())
     return Execution(measure_executed(cells, values, motion, tool, target), reached)

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 from builders.plate_passes import passes
 from nrdf.errors import ProcessError
@@ -16,7 +17,7 @@ from nrdf.process_model.feed_planner import (
     usual_slowness,
     within_acceleration,
 )
-from nrdf.process_model.moves import Moves
+from nrdf.process_model.moves import Moves, ToolSamples
 from nrdf.process_model.result import Target
 from nrdf.process_model.result_model import ResultModel
 from nrdf.process_model.spray_profile import SprayProfile
@@ -51,6 +52,22 @@ def test_a_plate_becomes_more_even_and_limits_hold():
     assert found.variation < 0.6 * constant.variation
     assert feeds.min() >= LIMITS.least_m_s and feeds.max() <= LIMITS.most_m_s
     assert within_acceleration(feeds, model.moves, LIMITS) == pytest.approx(feeds, rel=1e-6)
+
+
+def test_what_lines_do_not_reach_takes_nothing_out_of_the_tolerance():
+    """Two cells of three get a move each; the third gets little of one move, whatever its feed."""
+    matrix = csr_matrix(np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.4]]) * 1.5e-5)
+    still = np.zeros((0, 3))
+    none = ToolSamples(still, still, still, np.zeros(0), np.zeros(0, int))
+    moves = Moves(
+        np.full(2, 0.1), np.ones(2), np.arange(2), np.zeros(2), np.ones(2, bool), none, none,
+        np.zeros(0, bool),
+    )  # fmt: skip
+    feeds = plan_feeds(
+        matrix, np.zeros(3), np.array([1.0, 1.0, 0.5]), np.zeros(2), 60e-6, 6e-6, moves, LIMITS
+    )
+    film = matrix @ (1.0 / feeds)
+    assert np.abs(film[:2] - 60e-6).max() < 6e-6 < 60e-6 - film[2]
 
 
 def test_ten_thousand_cells_in_three_seconds():

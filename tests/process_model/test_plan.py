@@ -15,7 +15,6 @@ from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import Target
 from nrdf.process_model.result_model import ResultModel
-from nrdf.process_model.run_up import fastest_from_rest, rooms_for
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
@@ -70,7 +69,7 @@ def test_lines_are_as_theory_has_them_farther_apart_or_as_taught():
     tried = strategies_for(TAUGHT, GUN)
     even = best_stepover(GUN)
     assert [one.stepover_m for one in tried] == pytest.approx([1.5 * even, even, 0.03])
-    assert {one.run_off_m for one in tried} == {0.5 * 0.05}
+    assert {one.run_off_m for one in tried} == {0.3 * 0.05}
     assert len(strategies_for(replace(TAUGHT, stepover_m=1.02 * even), GUN)) == 2
     pad = Pad(0.05, 2e7, 5e-9, 20.0, 1000.0, 0.0025)
     assert strategies_for(TAUGHT, pad)[0].run_off_m == TAUGHT.run_off_m
@@ -85,9 +84,7 @@ def test_lines_are_chosen_by_what_they_leave(region):
     for own in strategies_for(TAUGHT, GUN):
         lines = plan_on_mesh(region, own)
         model = ResultModel.of(region, lines, GUN)
-        rooms = rooms_for(lines, region.parent, GUN.standoff_m)
-        feeds = feeds_for(model, TARGET, limits, fastest_from_rest(model.moves, rooms, limits))
-        within[own.stepover_m] = model.measure(TARGET, feeds).within
+        within[own.stepover_m] = model.measure(TARGET, feeds_for(model, TARGET, limits)).within
     made = plan_by_result(region, taught, TAUGHT, GUN, TARGET, limits)
     assert made.strategy.stepover_m == max(within, key=within.__getitem__)
     assert made.metrics.within == pytest.approx(max(within.values()))

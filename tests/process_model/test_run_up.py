@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from builders.plate_passes import passes
-from nrdf.process_model.feed_planner import FeedLimits
 from nrdf.process_model.moves import Moves
-from nrdf.process_model.run_up import fastest_from_rest, rooms_for, with_run_up
+from nrdf.process_model.run_up import rooms_for, with_run_up
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.types import Segment, split_at_edges
-
-LIMITS = FeedLimits(0.01, 1.0, 2.0)
 
 
 def a_line(standoff=0.15):
@@ -40,16 +36,6 @@ def test_a_wall_leaves_less_room():
     assert rooms.shape == (1, 2)
     assert rooms[0, 0] == pytest.approx(0.15)  # as far as is looked
     assert rooms[0, 1] == pytest.approx(0.16 - 0.6 * 0.15, abs=0.0101)
-
-
-def test_from_rest_the_mean_speed_of_a_move_is_the_parabola_s():
-    moves = Moves.of(passes([0.0], 0.1), 0.01)
-    found = fastest_from_rest(moves, np.zeros((1, 2)), LIMITS)
-    seconds = np.sqrt(2.0 * np.cumsum(moves.lengths_m)[:2] / 2.0)
-    taken = np.diff(seconds, prepend=0.0)
-    assert found[:2] == pytest.approx(moves.lengths_m[:2] / taken)
-    assert found == pytest.approx(found[::-1])
-    assert (fastest_from_rest(moves, np.full((1, 2), 0.5), LIMITS) > 2.0 * found.min()).all()
 
 
 def test_a_line_passes_its_ends_at_speed_with_the_gun_off_before():

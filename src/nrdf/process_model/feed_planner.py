@@ -4,7 +4,9 @@ Film and depth are sums over the moves, each in proportion to its slowness (s/m)
 every move is what is solved for: the squared deviation from the target over the region's area, more
 where the tolerance is not kept, a little for what is wasted beside the region and for change from
 move to move, within the limits on speed (L-BFGS-B: Byrd et al., 1995). Acceleration above what is
-allowed costs too; a pass forwards and one backwards takes away the last of it.
+allowed costs too; a pass forwards and one backwards takes away the last of it. Solved again with
+less weight on what was outside the tolerance (iteratively reweighted least squares): a place that
+the lines do not reach would else get its film at its neighbours' cost.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ _MORE = 30.0  # times
 _ALLOWED, _LIMIT = 0.9, 1.0  # share of the acceleration allowed; what it costs to have more
 _SHORTEST_M = 1e-4
 _STEPS = 250
+_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -68,14 +71,12 @@ def plan_feeds(
     moves: Moves,
     limits: FeedLimits,
     weights: FeedWeights | None = None,
-    fastest_m_s: np.ndarray | float = np.inf,
 ) -> np.ndarray:
     """Feeds (m,), m/s, of all moves.
 
     matrix: (n, m), m², from slowness to film on the region's cells; fixed: (n,), m, what dwells
     leave there; areas_m2: (n,). spill_m3: (m,) what each move leaves elsewhere, for each second a
-    metre. fastest_m_s: (m,), where moves have limits of their own. Never raises for a target out of
-    reach: the feeds are then the nearest within the limits.
+    metre. Never raises for a target out of reach: the feeds are then the nearest within the limits.
     """
     weights = weights or FeedWeights()
     share = areas_m2 / areas_m2.sum()
@@ -88,7 +89,7 @@ def plan_feeds(
     change = _changes(moves, weights.change)
     pull = (change.T @ change).tocsr()
 
-    fastest = np.minimum(np.sqrt(_most_at_turns(moves, limits)), fastest_m_s)
+    fastest = np.sqrt(_most_at_turns(moves, limits))
     lowest = np.clip(
         1.0 / fastest / usual, 1.0 / limits.most_m_s / usual, 1.0 / limits.least_m_s / usual
     )
@@ -114,11 +115,15 @@ def plan_feeds(
         slope += by_squared * -2.0 * squared / x
         return float(value), slope
 
-    solved = minimize(
-        cost, np.clip(np.ones(len(lowest)), lowest, highest), jac=True, method="L-BFGS-B",
-        bounds=np.stack([lowest, highest], axis=1), options={"maxiter": _STEPS, "maxcor": 20},
-    )  # fmt: skip
-    feeds = within_acceleration(np.minimum(1.0 / (usual * solved.x), fastest), moves, limits)
+    bounds = np.stack([lowest, highest], axis=1)
+    x = np.clip(np.ones(len(lowest)), lowest, highest)
+    for _ in range(_ROUNDS):
+        options = {"maxiter": _STEPS, "maxcor": 20}
+        x = minimize(cost, x, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
+        # What no feed brings within the tolerance must not take others out of it.
+        far = np.abs(per @ x + start) * target_m / tolerance_m
+        share = areas_m2 / areas_m2.sum() / np.maximum(far, 1.0) ** 2
+    feeds = within_acceleration(np.minimum(1.0 / (usual * x), fastest), moves, limits)
     return np.asarray(np.clip(feeds, limits.least_m_s, limits.most_m_s))
 
 

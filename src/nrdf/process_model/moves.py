@@ -103,16 +103,7 @@ def _applied(segment: Segment) -> Segment:
     on = np.flatnonzero(segment.applies)
     if segment.tool_on is None or not len(on):
         return segment
-    kept = slice(on[0], on[-1] + 1)
-    feeds, over = segment.feeds_m_s, segment.on_surface
-    return replace(
-        segment,
-        positions=segment.positions[kept],
-        quaternions_xyzw=segment.quaternions_xyzw[kept],
-        feeds_m_s=None if feeds is None else feeds[kept],
-        on_surface=None if over is None else over[kept],
-        tool_on=None,
-    )
+    return replace(segment.part(slice(on[0], on[-1] + 1)), tool_on=None)
 
 
 def _turns(positions: np.ndarray) -> np.ndarray:

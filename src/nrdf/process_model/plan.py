@@ -22,15 +22,15 @@ from nrdf.process_model.plate_theory import best_stepover
 from nrdf.process_model.removal import Pad
 from nrdf.process_model.result import ResultMetrics, Target
 from nrdf.process_model.result_model import ResultModel, Tool, cells_for, with_feeds
-from nrdf.process_model.run_up import fastest_from_rest, rooms_for, with_run_up
+from nrdf.process_model.run_up import rooms_for, with_run_up
 from nrdf.process_model.spray_profile import SprayProfile
 from nrdf.surface.region_mesh import RegionMesh
 from nrdf.toolpath.mesh_planner import plan_on_mesh
 from nrdf.toolpath.strategy import LineOrder, Strategy
 from nrdf.toolpath.types import Segment
 
-_RUN_OFF = 0.5  # half-widths along the travel: slower ends do the rest
-_STEADY = 1.0  # half-widths over which a gun's axis is averaged: its fan covers as much at once
+_RUN_OFF = 0.3  # half-widths along the travel: slower ends do the rest
+_STEADY = 3.0  # half-widths over which a gun's axis is averaged: an arm can turn its hand no faster
 _STEPOVERS = (1.5, 1.0)
 """Times the stepover of theory that are tried. Lines farther apart are driven slower, which
 leaves the arm more time to change its speed; finer ones are more even."""
@@ -79,14 +79,9 @@ def plan_by_result(
             return rooms_for(lines, region.parent, tool.standoff_m)
         return np.zeros((sum(segment.kind == "process" for segment in lines), 2))
 
-    def fastest_of(model: ResultModel, rooms: np.ndarray) -> np.ndarray:
-        if isinstance(tool, SprayProfile):
-            return fastest_from_rest(model.moves, rooms, limits)
-        return np.full(len(model.moves.lengths_m), np.inf)  # a pad's force follows its speed
-
     def planned(lines: Sequence[Segment], own: Strategy, model: ResultModel) -> PlannedResult:
+        feeds = feeds_for(model, target, limits)
         rooms = rooms_of(lines)
-        feeds = feeds_for(model, target, limits, fastest_of(model, rooms))
         return _driven(lines, own, model, feeds, rooms, target, limits, plain)
 
     if not replan:
@@ -107,8 +102,7 @@ def plan_by_result(
         raise fault
     if plain.within > best.metrics.within:  # what is taught is never made worse
         rooms = rooms_of(taught)
-        feeds = np.minimum(plain_feeds, fastest_of(before, rooms))
-        made = _driven(taught, strategy, before, feeds, rooms, target, limits, plain)
+        made = _driven(taught, strategy, before, plain_feeds, rooms, target, limits, plain)
         best = made if made.metrics.within > best.metrics.within else best
     return best
 
@@ -150,16 +144,14 @@ def _driven(
     return PlannedResult(segments, strategy, model, model.measure(target), taught)
 
 
-def feeds_for(
-    model: ResultModel, target: Target, limits: FeedLimits, fastest_m_s: np.ndarray | float = np.inf
-) -> np.ndarray:
-    """Feeds (m,), m/s, with which a path comes nearest to a target, none above `fastest_m_s` (m,).
-    Raises ProcessError where it is out of reach."""
+def feeds_for(model: ResultModel, target: Target, limits: FeedLimits) -> np.ndarray:
+    """Feeds (m,), m/s, with which a path comes nearest to a target. Raises ProcessError where that
+    is out of reach."""
     check_in_reach(model, target, limits)
     inside = model.cells.inside
     return plan_feeds(
         model.on_region, model.fixed[inside], model.region_areas_m2, model.spill_m3(),
-        target.value_m, target.tolerance_m, model.moves, limits, fastest_m_s=fastest_m_s,
+        target.value_m, target.tolerance_m, model.moves, limits,
     )  # fmt: skip
 
 

@@ -2,8 +2,8 @@
 at speed.
 
 An arm that begins a line at rest with the gun on leaves far too much there. So the line goes on
-straight beyond its ends by v²/2a, where the gun has the room for that; where it has less, the arm
-is as slow there as it must be, and the plan knows it.
+straight beyond its ends by v²/a, as far as the gun has the room for that. Where it has less, an arm
+is slow there, and its gun has to wait (`nrdf.robot.planning.slow_ends`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from nrdf.geometry.frames import unit_vectors
-from nrdf.process_model.feed_planner import FeedLimits
-from nrdf.process_model.moves import Moves
 from nrdf.surface.target_mesh import TargetMesh
 from nrdf.toolpath.types import Segment
 
@@ -49,21 +47,6 @@ def _ends(work: Sequence[Segment]) -> tuple[np.ndarray, np.ndarray]:
         ends += [places[0], places[-1]]
         away += [places[0] - places[1], places[-1] - places[-2]]
     return np.array(ends), unit_vectors(np.array(away))
-
-
-def fastest_from_rest(moves: Moves, rooms_m: np.ndarray, limits: FeedLimits) -> np.ndarray:
-    """The largest mean feeds (m,), m/s, of moves whose segments begin and end at rest, that far
-    (s, 2) before and after them."""
-    fastest = np.full(len(moves.lengths_m), np.inf)
-    push = 2.0 * limits.acceleration_m_s2
-    for number in np.unique(moves.segment):
-        own = np.flatnonzero(moves.segment == number)
-        for side, order in ((0, own), (1, own[::-1])):
-            room = rooms_m[number, side] / _SPARE
-            passed = room + np.concatenate([[0.0], np.cumsum(moves.lengths_m[order])])
-            speeds = np.sqrt(push * passed)  # at each waypoint, by which the mean is the half sum
-            fastest[order] = np.minimum(fastest[order], 0.5 * (speeds[1:] + speeds[:-1]))
-    return np.clip(fastest, limits.least_m_s, limits.most_m_s)
 
 
 def with_run_up(

@@ -75,6 +75,11 @@ class Segment:
         return self.tool_on is not None and self.force_n is None
 
     @property
+    def runs_up_at(self) -> np.ndarray:
+        """Where (n,) it only runs up to its speed, or slows down, with its gun off."""
+        return ~self.applies & self.runs_up
+
+    @property
     def over_surface(self) -> np.ndarray:
         """Whether (n,) the tool is on and over the surface at each waypoint of a process segment;
         nowhere on free moves."""
@@ -96,6 +101,21 @@ class Segment:
     def axes(self) -> np.ndarray:
         """The tool's axes (n, 3), unit: tool z, into the part, in the job's frame."""
         return z_axes(self.quaternions_xyzw)
+
+    def part(self, chosen: slice) -> Segment:
+        """The segment of some of its waypoints."""
+
+        def of(values: np.ndarray | None) -> np.ndarray | None:
+            return None if values is None else values[chosen]
+
+        return replace(
+            self,
+            positions=self.positions[chosen],
+            quaternions_xyzw=self.quaternions_xyzw[chosen],
+            feeds_m_s=of(self.feeds_m_s),
+            on_surface=of(self.on_surface),
+            tool_on=of(self.tool_on),
+        )
 
     @property
     def waypoints(self) -> tuple[Waypoint, ...]:
@@ -165,22 +185,17 @@ def split_at_edges(segment: Segment) -> list[Segment]:
         over = bool(there[start])
         last = stop == len(there)
         chosen = slice(start, stop if last or state[stop] < state[start] else stop + 1)
-        feeds = segment.feeds_m_s
         kind: SegmentKind = "process"
         if not state[start]:
             kind = "approach" if not start else "retract"
+        beyond = kind == "process" and not over
         parts.append(
             replace(
-                segment,
+                segment.part(chosen),
                 kind=kind,
-                positions=segment.positions[chosen],
-                quaternions_xyzw=segment.quaternions_xyzw[chosen],
-                feeds_m_s=None if feeds is None else feeds[chosen],
                 force_n=segment.force_n if over else None,
                 dwell_s=segment.dwell_s if last else 0.0,
-                on_surface=None
-                if over or kind != "process"
-                else np.zeros(len(segment.positions[chosen]), bool),
+                on_surface=np.zeros(chosen.stop - chosen.start, bool) if beyond else None,
                 tool_on=None,
             )
         )

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from builders.arm_cells import path_of
+from nrdf.robot.planning import joint_path_planner
 from nrdf.robot.planning.joint_path_planner import fewest_runs, plan_joint_paths
 
 
@@ -28,6 +30,34 @@ def test_why_a_waypoint_is_not_covered(wall):
     paths, covered, reachability = plan_joint_paths(wall.cell, wall.library, far.groups)
     assert not paths and not covered[0].any()
     assert not reachability[0].solved.any()
+
+
+def test_a_gun_s_run_up_is_driven_as_far_as_the_arm_reaches_it(wall):
+    """Of 4 waypoints with the gun off before a line of 6, the arm reaches the last one."""
+    near = np.linspace(-0.02, 0.03, 6)
+    x = np.concatenate([[5.0, 5.1, 5.2], [-0.03], near])
+    path = path_of(np.stack([x, np.full(10, 0.03), np.zeros(10)], axis=1), force=None)
+    line = replace(path.segments[0], tool_on=np.arange(10) >= 4)
+    groups = replace(path, segments=(line,)).groups
+    (made,), covered, _ = plan_joint_paths(wall.cell, wall.library, groups)
+    assert (made.first, made.last) == (3, 9)
+    assert covered[0].all()
+
+
+def test_inside_a_line_a_gun_goes_on_where_it_went_off(wall, monkeypatch):
+    """Joint paths of at most 8 waypoints, as if the arm came no farther."""
+    line = replace(wall.path.segments[0], force_n=None, tool_on=np.ones(12, bool))
+    groups = replace(wall.path, segments=(line,)).groups
+    runs = joint_path_planner._runs
+
+    def short(*args):
+        return [(first, min(last, first + 7)) for first, last in runs(*args)]
+
+    monkeypatch.setattr(joint_path_planner, "_runs", short)
+    paths, _, _ = plan_joint_paths(wall.cell, wall.library, groups)
+    ends = sorted((path.first, path.last) for path in paths)
+    assert len(ends) > 1
+    assert all(one[1] == other[0] for one, other in itertools.pairwise(ends))
 
 
 def cheapest(runs, wanted):

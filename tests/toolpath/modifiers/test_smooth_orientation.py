@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from nrdf.toolpath.modifiers.smooth_orientation import (
     LARGEST_TILT_RAD,
     LARGEST_TURN_RAD_M,
     smooth_orientation,
+    steady_normals,
 )
 from nrdf.toolpath.modifiers.split import turns
 
@@ -42,3 +45,14 @@ def test_what_turns_slowly_stays_as_it_is():
     assert smooth_orientation([flat])[0] is flat
     assert smooth_orientation([round_])[0] is round_
     assert smooth_orientation([]) == []
+
+
+def test_normals_are_averaged_along_a_line_to_its_very_ends():
+    path = over_an_edge(np.radians(60.0), 0.002)
+    (made,) = steady_normals([path], 0.03)
+    assert rates(made).max() < 0.1 * rates(path).max()
+    assert steady_normals([path], 0.0)[0] is path
+    bent = replace(path, normals=path.normals.copy())
+    bent.normals[-1] = bent.normals[0]  # a single one at the end has no weight of its own
+    (made,) = steady_normals([bent], 0.03)
+    assert angles_between(made.normals[-1:], bent.normals[-2:-1])[0] < np.radians(20.0)

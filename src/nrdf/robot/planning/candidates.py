@@ -15,7 +15,6 @@ from nrdf.robot.planning.reachability import SEEDS, IKSolutions, solve_everywher
 from nrdf.toolpath.types import SegmentGroup
 
 _KEPT, _KEPT_PER_INDEX = 6, 2
-_OVERLAP = 12  # waypoints that are covered already, over which a gun runs up to its speed
 
 
 @dataclass
@@ -145,10 +144,10 @@ def _track(
     rows: np.ndarray | None = None,
 ) -> None:
     """Extend candidates (`rows` of them, or all) from `start` forwards (1) or backwards (-1), until
-    they fail, or come to the segment's end or to what is covered: a gun's a little over it."""
+    they fail, or come to the segment's end or to what is covered: a gun's to its first waypoint."""
     active = np.arange(len(start)) if rows is None else rows
     at = start.copy()
-    left = np.array([_OVERLAP if groups[i].process.runs_up else 0 for i in candidates.group])
+    left = np.array([int(groups[i].process.runs_up) for i in candidates.group])
     joints = candidates.joints[active, at]
     before = joints.copy()
     while len(active):
@@ -157,6 +156,9 @@ def _track(
         there = np.array([0 <= k < len(covered[i]) for i, k in pairs], bool)
         taken = np.array(
             [ok and covered[i][k] for ok, (i, k) in zip(there, pairs, strict=True)], bool
+        )
+        taken[there] &= ~np.array(
+            [groups[i].process.runs_up_at[k] for i, k in np.array(pairs)[there]], bool
         )
         inside = there & (~taken | (left[active] > 0))
         left[active[taken]] -= 1

@@ -27,7 +27,6 @@ class JointPath:
 
     group: index of its segment group; first, last: of the segment's waypoints, inclusive. axes:
     (m, 3) of the tool there, in the object's frame: the planned ones unless tilted; joints: (m, n).
-    works: between which of the segment's waypoints its gun is on; None: wherever the segment's is.
 
     dense: (k, n) joints along the path, with positions between the waypoints; waypoint: (k,) where
     each is, a number between 0 and m - 1. approach (j, n), retract (j, n): joints along the free
@@ -44,7 +43,6 @@ class JointPath:
     waypoint: np.ndarray = field(default_factory=lambda: np.zeros(0))
     approach: np.ndarray = field(default_factory=_none)
     retract: np.ndarray = field(default_factory=_none)
-    works: tuple[int, int] | None = None
 
     def whole(self) -> np.ndarray:
         """Joints (k, n) from the approach's start to the retract's end."""

@@ -9,11 +9,9 @@ again with the tool axis tilted a little.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from nrdf.geometry.polylines import step_lengths
 from nrdf.robot.model.cell import Cell
 from nrdf.robot.planning.approach_retract import add_approach_retract
 from nrdf.robot.planning.candidates import CandidatePaths, track_beyond, track_from
@@ -26,7 +24,6 @@ _ANCHORS_APART = 60
 _ROUNDS, _TILTED_ROUNDS = 5, 2
 _TURN = 6  # waypoints that a turn of the object must add, or save in lifts
 _SHORTEST = 3  # waypoints of a joint path that is worth a lift, unless nothing longer is found
-_RUN_UP_S = 0.2  # at a line's feed, by which joint paths of a gun overlap with it off
 
 
 def plan_joint_paths(
@@ -34,10 +31,10 @@ def plan_joint_paths(
 ) -> tuple[list[JointPath], list[np.ndarray], list[Reachability]]:
     """Joint paths that cover the groups' process segments as far as the arm can.
 
-    Also for each group which waypoints (n,) are covered, and the reachability of those that are
-    not; it is only meaningful for those.
+    Also for each group which waypoints (n,) are covered, or need not be as a gun only runs up to
+    its speed there, and the reachability of those that are not; it is only meaningful for those.
     """
-    covered = [np.zeros(len(group.process.positions), bool) for group in groups]
+    covered = [group.process.runs_up_at for group in groups]
     paths: list[JointPath] = []
     opened: set[int] = set()
     for round_ in range(_ROUNDS):
@@ -98,7 +95,7 @@ def _lengthened(
         return paths
     candidates = track_beyond(cell, groups, again, covered)
     for path in again:
-        covered[path.group][:] = False
+        covered[path.group] = groups[path.group].process.runs_up_at
     kept = [path for path in paths if whole[path.group]]
     return kept + _cover(cell, groups, candidates, covered, 1, opened)
 
@@ -117,7 +114,6 @@ def _cover(
     """
     paths: list[JointPath] = []
     dropped = np.zeros(len(candidates.group), bool)
-    at_rest: set[int] = set()  # rows whose gun goes on at rest, as the arm has no way into them
     while True:
         runs = {
             int(i): [
@@ -130,43 +126,45 @@ def _cover(
         chosen = _on_few_turns(candidates, runs, covered, least, opened)
         if not chosen:
             return paths
-        longer = [
-            part if part[0] in at_rest else _with_run_up(groups, candidates, *part)
-            for part in chosen
-        ]
-        for (row, first, last), long, path in zip(
-            chosen, longer, _complete(cell, groups, candidates, longer), strict=True
+        longer = [_with_seam(groups, candidates, covered, chosen, *part) for part in chosen]
+        for (row, first, last), path in zip(
+            longer, _complete(cell, groups, candidates, longer), strict=True
         ):
             if path is not None:
-                if long != (row, first, last):
-                    path = replace(path, works=(first, last))
                 paths.append(path)
                 covered[path.group][first : last + 1] = True
                 opened.add(path.turntable_index)
-            elif long != (row, first, last):
-                at_rest.add(row)
             elif not candidates.blocked[row, first:last].any():
                 dropped[row] = True
 
 
-def _with_run_up(
-    groups: Sequence[SegmentGroup], candidates: CandidatePaths, row: int, first: int, last: int
+def _with_seam(
+    groups: Sequence[SegmentGroup],
+    candidates: CandidatePaths,
+    covered: Sequence[np.ndarray],
+    chosen: Sequence[tuple[int, int, int]],
+    row: int,
+    first: int,
+    last: int,
 ) -> tuple[int, int, int]:
-    """A part (row, first, last) of a candidate, longer by what a gun needs to reach its speed, as
-    far as the arm gets; the same where something is pressed on the surface."""
-    process = groups[int(candidates.group[row])].process
+    """A part (row, first, last) of a candidate with its gun's run-up, as far as the arm reaches it;
+    inside a line the gun goes on where that of the joint path beside it goes off."""
+    i = int(candidates.group[row])
+    process = groups[i].process
     if not process.runs_up:
         return row, first, last
-    good, blocked = candidates.good[row], candidates.blocked[row]
-    steps, speeds = step_lengths(process.positions), process.speeds_m_s
-    ends = []
-    for k, step, stop in ((first, -1, 0), (last, 1, len(speeds) - 1)):
-        left = _RUN_UP_S * float(speeds[min(k + 1, len(speeds) - 1)])
-        while k != stop and left > 0.0 and good[k + step] and not blocked[min(k, k + step)]:
-            left -= float(steps[min(k, k + step)])
-            k += step
-        ends.append(k)
-    return row, ends[0], ends[1]
+    good, blocked, done = candidates.good[row], candidates.blocked[row], covered[i]
+    gun_off = process.runs_up_at
+    ends = {stop for other, _, stop in chosen if candidates.group[other] == i}
+    if first and not gun_off[first - 1] and (done[first - 1] or first - 1 in ends):
+        first -= bool(good[first - 1] and not blocked[first - 1])
+    while first and gun_off[first - 1] and good[first - 1] and not blocked[first - 1]:
+        first -= 1
+    if last + 1 < len(done) and not gun_off[last + 1] and done[last + 1]:
+        last += bool(good[last + 1] and not blocked[last])
+    while last + 1 < len(done) and gun_off[last + 1] and good[last + 1] and not blocked[last]:
+        last += 1
+    return row, first, last
 
 
 def _on_few_turns(

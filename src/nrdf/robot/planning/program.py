@@ -14,15 +14,14 @@ from nrdf.robot.planning.approach_retract import lengthen
 from nrdf.robot.planning.inverse_kinematics import SeedLibrary
 from nrdf.robot.planning.joint_path import JointPath
 from nrdf.robot.planning.motion_planner import Roadmap
+from nrdf.robot.planning.slow_ends import feed_share, force_share, gun_waits
 from nrdf.robot.planning.timing import FREE_SHARE, STEP_S, TimedTrajectory, time_parameterize
-from nrdf.toolpath.types import Segment, SegmentGroup
+from nrdf.toolpath.types import SegmentGroup
 
 FREE_M_S = 1.5
 """How fast the tool may be in free moves."""
 TURNTABLE_RAD_S = np.radians(45.0)
 """How fast the turntable turns."""
-LEAST_FORCE_SHARE = 0.1
-"""Share of its force with which a pad that stands still rests on the surface."""
 _MAX_SHIFTED = 3
 _FARTHEST_RAD = 5.0  # of a joint from home
 _HOME_CLEARANCE_M = 0.05
@@ -264,19 +263,6 @@ def _turntable_move(cell: Cell, before: int, after: int, home: np.ndarray) -> Ac
     return Action("turntable", after, timed, angles_rad=angles)
 
 
-def _force_share(
-    cell: Cell, process: Segment, joints: np.ndarray, at: np.ndarray
-) -> np.ndarray | None:
-    """The share (t,) of its force with which a pad presses, where feeds were planned by the result:
-    that of its feed which it has, so that it takes off as much everywhere. At waypoints `at` (t,).
-    """
-    if process.force_n is None or process.feeds_m_s is None or len(joints) < 2:
-        return None
-    speeds = np.linalg.norm(np.gradient(cell.chain.frames(joints).tcp, STEP_S, axis=0), axis=1)
-    number = np.arange(len(process.positions))
-    return np.clip(speeds / np.interp(at + 0.5, number, process.speeds_m_s), LEAST_FORCE_SHARE, 1.0)
-
-
 def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Action]:
     """Approach, process and retract of a joint path."""
     process = group.process
@@ -310,15 +296,16 @@ def _path_actions(cell: Cell, group: SegmentGroup, path: JointPath) -> list[Acti
             None if there is None else ~(there[before] & there[after])
             for there in (process.on_surface, process.tool_on)
         )
-        if path.works is not None and tool_off is not None:
-            tool_off |= (at < path.works[0] - 1e-6) | (at > path.works[1] + 1e-6)
+        share = feed_share(cell, process, timed.joints, at)
+        if process.runs_up and tool_off is not None:
+            tool_off |= gun_waits(share, ~tool_off)
         return replace(
             made,
             force_n=process.force_n,
             dwell_s=process.dwell_s,
             off_surface=beyond,
             tool_off=tool_off,
-            force_share=_force_share(cell, process, timed.joints, at),
+            force_share=force_share(process, share),
         )
 
     return [

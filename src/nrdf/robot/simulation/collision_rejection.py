@@ -142,7 +142,7 @@ def _split(path: JointPath, hit: np.ndarray) -> list[JointPath]:
             made.append(
                 JointPath(
                     path.group, path.first + first, path.first + last, path.turntable_index,
-                    path.axes[part], path.joints[part], works=path.works,
+                    path.axes[part], path.joints[part],
                 )
             )  # fmt: skip
     return made

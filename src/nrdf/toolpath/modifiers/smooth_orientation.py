@@ -51,8 +51,8 @@ def smooth_orientation(
 def steady_normals(paths: Sequence[SurfacePath], reach_m: float) -> list[SurfacePath]:
     """Paths whose normals are averaged that far to either side along them, the near ones most.
 
-    Towards an end as far as to the end alone, so that the ends keep their own. Closed paths stay as
-    they are; a reach of 0 changes nothing.
+    Towards an end over what there is of the line. Closed paths stay as they are; a reach of 0
+    changes nothing.
     """
     return [path if path.closed else _steady(path, reach_m) for path in paths]
 
@@ -61,8 +61,7 @@ def _steady(path: SurfacePath, reach_m: float) -> SurfacePath:
     if reach_m <= 0.0 or len(path.contacts) < 3:
         return path
     along = arc_length(path.contacts)
-    reach = np.minimum(np.minimum(along, along[-1] - along) + 1e-9, reach_m)
-    away = np.abs(along[None] - along[:, None]) / reach[:, None]
+    away = np.abs(along[None] - along[:, None]) / reach_m
     weights = np.maximum(1.0 - away, 0.0)
     return replace(path, normals=unit_vectors(weights @ path.normals))
 
