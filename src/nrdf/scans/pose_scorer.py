@@ -52,6 +52,7 @@ _OTHER_YAWS = np.pi / 2 * np.arange(1, 4)
 _OTHER_UPS = [turn for turn in Rotation.create_group("O").as_matrix() if turn[1, 1] < 0.5]
 _LIKELY_UPS = 3  # orientations that are looked at closely
 _MUCH = 0.15  # difference of cost from which another yaw is much better
+_BEST = 2  # prototypes that are most like the cloud, by which it is judged
 _LEAST_SPREAD = 0.15  # of the logarithm of proportions
 
 
@@ -177,7 +178,7 @@ class PoseScorer:
             change = np.linalg.norm(found.points - template.points, axis=1).mean()
             unexplained = _unexplained(found.distance) + _unexplained(found.back)
             costs.append(unexplained + _MOVED * float(change))
-        return float(np.mean(costs))
+        return float(np.sort(costs)[:_BEST].mean())
 
     def proportion_z_score(self, points: np.ndarray) -> float:
         """Z-score of the proportions of a canonical cloud (n, 3): standard deviations from the
