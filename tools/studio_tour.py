@@ -177,7 +177,7 @@ def bring_to(tour: Tour, scan: Path, name: str) -> None:
     tour.shoot(f"{name}-pose")
     tour.press("It stands like this")
     tour.press("Transfer the process")
-    tour.wait_for(re.compile(rf"{name}: \d+ tool path"), f"regions and tool paths on {name}")
+    tour.wait_for(re.compile(rf"{name}: [1-9]\d* tool path"), f"regions and tool paths on {name}")
     tour.shoot(f"{name}-paths")
     tour.tab("5 Save")
     with tour.page.expect_download(timeout=240e3) as sent:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from builders.scenes import UP, full, pose, scorer, yaw_error
 from nrdf.errors import CloudError
+from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 from nrdf.scans.align import Alignment, Candidate, align_scan
 
@@ -42,3 +44,12 @@ def test_likely_poses_are_those_that_no_other_one_beats_clearly():
 def test_an_unusable_scan_is_refused():
     with pytest.raises(CloudError, match="has 10 points; at least 256"):
         align_scan(scorer("chair"), PointCloud(np.random.default_rng(0).random((10, 3))), UP)
+
+
+def test_an_object_that_lies_askew_is_found_by_the_box_around_it():
+    turn = Rotation.from_euler("xyz", (100, 25, 40), degrees=True).as_matrix()
+    place = Similarity(turn, np.array([300.0, -200.0, 900.0]), 850.0)
+    points = place.to_scan(full("chair", CHAIR).points)
+    found = align_scan(scorer("chair"), PointCloud(points))
+    # The back of this one leans, and so does the smallest box: 11 degrees.
+    assert yaw_error(found.best.pose, place) < 12 and found.best.probability > 0.9

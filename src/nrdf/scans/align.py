@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from trimesh import bounds
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.geometry.canonical import MIRROR, canonical_transform, rotation_about_up
@@ -25,6 +26,7 @@ WORKING_POINTS = 8192
 _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
 _REFINED = 4  # of them that are refined
+_ASKEW = np.radians(8)  # from all axes, from which a direction is tried beside them
 _TWISTS = 4  # times that a yaw is corrected where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
@@ -116,7 +118,8 @@ class _Hypothesis:
 def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = None) -> Alignment:
     """Poses in which `scan`, a cleaned one of one object, is an object of the scorer's category.
 
-    up: (3,) unit, in the scan's frame; the six axes are tried unless given. Raises CloudError for a
+    up: (3,) unit, in the scan's frame; the six axes and the sides of the smallest box around it are
+    tried unless given. Raises CloudError for a
     cloud that is empty, flat, or has too few points.
     """
     check_cloud(scan, MINIMUM_POINTS)
@@ -130,7 +133,7 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
 
     working = _prepare(scan)
     lap("normals")
-    ups = [up_axis(name) for name in AXES] if up is None else [up]
+    ups = _likely_ups(working.points) if up is None else [up]
     yaws = 2 * np.pi / _YAWS * np.arange(_YAWS)
     tried = [_Hypothesis(axis, yaw) for axis in ups for yaw in yaws]
     chosen = sparse_subset(working.points, _COARSE_POINTS)
@@ -154,6 +157,15 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
     weights = np.exp((candidates[0].cost - np.array([c.cost for c in candidates])) / COST_SCALE)
     weighed = zip(candidates, weights / weights.sum(), strict=True)
     return Alignment(tuple(replace(c, probability=float(w)) for c, w in weighed), seconds)
+
+
+def _likely_ups(points: np.ndarray) -> list[np.ndarray]:
+    """Directions (3,) in which points (n, 3) may have their upper side: the six axes, and, where
+    the smallest box around them stands askew, the six directions of its sides."""
+    ups = [up_axis(name) for name in AXES]
+    sides = bounds.oriented_bounds(points)[0][:3, :3]
+    askew = [side for side in (*sides, *-sides) if np.abs(side).max() < np.cos(_ASKEW)]
+    return [*ups, *askew]
 
 
 def _prepare(scan: PointCloud) -> _Working:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import pytest
 
@@ -11,6 +12,7 @@ from nrdf import cli
 from nrdf.field import zoo
 from nrdf.learn import judge
 from nrdf.process.model_choice import choose_model
+from nrdf.training.general_field import FineTuneSettings
 
 
 @pytest.fixture
@@ -18,6 +20,8 @@ def own_zoo(tmp_path, monkeypatch):
     monkeypatch.setattr(zoo, "user_data_path", lambda *_, **__: tmp_path / "data")
     monkeypatch.setattr(judge, "COPIES", 1)
     monkeypatch.setattr(judge, "REFERENCES", 1)
+    few = partial(FineTuneSettings, batch=2, kinds=1)
+    monkeypatch.setattr("nrdf.training.general_field.FineTuneSettings", few)
     return tmp_path / "data" / "zoo"
 
 

@@ -19,6 +19,7 @@ def test_measure_reports_what_fails_and_goes_on(monkeypatch, tmp_path, untrained
     monkeypatch.setattr(module, "command_seconds", lambda *arguments: 4.5)
     monkeypatch.setattr(module, "choose_weights", lambda *arguments: (untrained, "untrained"))
     monkeypatch.setattr(module, "measure_training", lambda *arguments: [])
+    monkeypatch.setattr("nrdf_benchmark.speed.large.KINDS", {})  # minutes: test_large.py
     speed(repeats=1, steps=1, out=tmp_path / "speed.json")
     said = json.loads((tmp_path / "speed.json").read_text())
     assert [s["preset"] for s in said["retrieval"]] == ["default"]

@@ -54,7 +54,7 @@ def test_the_default_field_comes_from_the_zoo_unless_a_model_is_given(tmp_path):
 def test_the_general_field_serves_every_category(tmp_path):
     (spec,) = find_methods(["general"], "sofa")
     assert spec.weights.name == "general.safetensors"
-    with pytest.raises(ModelError, match=r"needs weights of category '', but .* 'chair'"):
+    with pytest.raises(ModelError, match=r"needs weights of preset 'general', but .* 'default'"):
         find_methods(["general"], "sofa", ["general=chair"])
 
 
