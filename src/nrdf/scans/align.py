@@ -27,6 +27,7 @@ _COARSE_POINTS, _FINE_POINTS = 512, 1024  # that poses are scored with
 _YAWS = 36  # that are tried at first
 _REFINED = 4  # of them that are refined
 _ASKEW = np.radians(8)  # from all axes, from which a direction is tried beside them
+_ASKEW_COST = 0.1  # of such a direction: most scans stand along an axis
 _TWISTS = 4  # times that a yaw is corrected where there is no mirror plane
 _APART = np.radians(25)  # poses whose rotations differ by less are one
 _SYMMETRIC = 0.35  # agreement from which a mirror plane is believed
@@ -145,6 +146,8 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
     chosen = sparse_subset(working.points, _FINE_POINTS)
     points, normals = _posed(working, chosen, refined)
     costs = scorer.fine(*_completed(points, normals, refined))
+    if up is None:
+        costs += [_ASKEW_COST * bool(np.abs(found.up).max() < np.cos(_ASKEW)) for found in refined]
     candidates: list[Candidate] = []
     for index in np.argsort(costs):
         found = refined[index]
