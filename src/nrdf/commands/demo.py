@@ -17,7 +17,7 @@ from nrdf.commands.console import (
     versions,
     write_report,
 )
-from nrdf.commands.demo_new_kind import FOLDER, KIND, transfer_new_kind
+from nrdf.commands.demo_new_kind import FOLDER, KIND, overlap, transfer_new_kind
 from nrdf.commands.options import Folder
 
 if TYPE_CHECKING:
@@ -113,13 +113,6 @@ class Found:
     coverage: float | None
     cycle_time_s: float | None
     true_distance_99_m: float | None
-
-
-def overlap(indices: np.ndarray, truth: np.ndarray) -> float:
-    """Intersection over union of found indices (k,) and a true mask (n,); 1 if both are empty."""
-    common = int(truth[indices].sum())
-    union = len(indices) + int(truth.sum()) - common
-    return common / union if union else 1.0
 
 
 def _run(folder: Path, model: str, device: str) -> list[Found]:

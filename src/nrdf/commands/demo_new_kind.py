@@ -61,7 +61,6 @@ def transfer_new_kind(folder: Path, origin: dict[str, Any]) -> NewKind:
     (place / "job").mkdir()
     write_job_files(place / "job", result, Limits(), "next", origin)
     found = result.regions[REGION].match.indices
-    shared = int(true[found].sum())
     metrics = result.paths[0].metrics
     panels = [
         panel_of_reference(process_transfer, f"a {KIND}"),
@@ -70,10 +69,17 @@ def transfer_new_kind(folder: Path, origin: dict[str, Any]) -> NewKind:
     draw_regions(panels, place / "picture.png")
     return NewKind(
         chosen.note,
-        shared / max(len(found) + int(true.sum()) - shared, 1),
+        overlap(found, true),
         None if metrics is None else metrics.coverage,
         sum(result.seconds.values()),
     )
+
+
+def overlap(indices: np.ndarray, truth: np.ndarray) -> float:
+    """Intersection over union of found indices (k,) and a true mask (n,); 1 if both are empty."""
+    common = int(truth[indices].sum())
+    union = len(indices) + int(truth.sum()) - common
+    return common / union if union else 1.0
 
 
 def _table(seed: int) -> tuple[PointCloud, np.ndarray]:
