@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
 from nrdf.errors import ModelError
 from nrdf.field import zoo
+from nrdf.field.kind_network import KIND_ZOO
 from nrdf.field.zoo import add_to_zoo, find_weights, list_models, load_field
 
 
@@ -143,3 +145,16 @@ def test_the_users_own_models_stand_beside_the_packages_and_before_them(
     (tmp_path / "zoo" / "helmet.safetensors").unlink()
     with pytest.raises(ModelError, match="missing; learn it again"):
         find_weights("helmet")
+
+
+@pytest.mark.parametrize("folder", [zoo.ZOO, KIND_ZOO])
+def test_shipped_models_have_seen_only_shapes_that_a_company_may_use(folder):
+    allowed = re.compile(r"(MIT|BSD-style|CC0|Kenney \(CC0\)|CC-BY-[34]\.0|CC0 / CC-BY per file)$")
+    licences = {
+        (model.name, source, licence)
+        for model in list_models(folder)
+        for source, shapes in model.shapes.items()
+        for licence in shapes["licences"]
+    }
+    assert len(licences) > 10
+    assert [known for known in sorted(licences) if not allowed.match(known[2])] == []

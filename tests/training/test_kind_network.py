@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 import torch
+import trimesh
 
 from builders.step_shape import step_shape
 from nrdf.errors import DataError, ModelError
@@ -20,7 +21,7 @@ from nrdf.training.kind_network import KindSettings, draw, is_held_out, train_ki
 from nrdf.training.provenance import list_shapes
 
 FEW = KindSettings(steps=12, batch=8)
-MORE = KindSettings(steps=150, batch=24, rate=4e-3)
+MORE = KindSettings(steps=150, batch=24, rate=4e-3, others_licence="CC-BY-4.0")
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +53,11 @@ def few_heaps():
 
 @pytest.fixture(scope="module")
 def trained(folders, tmp_path_factory):
+    meshes = tmp_path_factory.mktemp("meshes")
+    for word in ("vase", "bowl", "cup", "plate"):
+        trimesh.creation.icosphere(2).export(meshes / f"{word}.ply")
     out = tmp_path_factory.mktemp("runs") / "kind"
-    return train_kind("step", [folders[0]], [folders[1]], out, settings=MORE)
+    return train_kind("step", [folders[0]], [folders[1], meshes], out, settings=MORE)
 
 
 def test_what_is_drawn_is_turned_as_its_answer_says(folders):
@@ -102,6 +106,8 @@ def test_what_was_trained_tells_steps_from_balls_and_which_way_they_stand(traine
     assert metadata["category"] == "step" and metadata["train"] == asdict(MORE)
     assert metadata["shapes"]["blocks"]["count"] == 10
     assert metadata["shapes"]["balls"]["licences"] == {"CC0": 11}
+    (meshes,) = (s for name, s in metadata["shapes"].items() if name.startswith("meshes of other"))
+    assert 0 < meshes["count"] < 4 and meshes["licences"] == {"CC-BY-4.0": meshes["count"]}
     assert trained.stat().st_size < 500_000
     points = np.random.default_rng(0).permutation(step_shape("", 0).surface_points)
     upside = points * [1, -1, -1]

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.geometry.threads import search_threads
 
 VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""
@@ -27,7 +28,9 @@ def snap(
     is above 0.
     """
     tree = cKDTree(oriented_features(target, target_normals, normal_weight))
-    distance, index = tree.query(oriented_features(mapped, mapped_normals, normal_weight))
+    distance, index = tree.query(
+        oriented_features(mapped, mapped_normals, normal_weight), workers=search_threads()
+    )
     return index, distance
 
 
@@ -48,5 +51,6 @@ def nearest_voters(
     distance, index = tree.query(
         oriented_features(target, target_normals, normal_weight),
         k=np.arange(1, min(count, len(mapped)) + 1),
+        workers=search_threads(),
     )
     return index, distance

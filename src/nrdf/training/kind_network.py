@@ -55,7 +55,6 @@ from nrdf.training.small_networks import (
 
 _SHARES = {"forward": 0.22, "turned": 0.28, "askew": 0.08, "tilted": 0.07, "other": 0.35}
 """How often a step shows what."""
-_LICENCE = "as the folder says"
 _PAIRS = 0.12  # of the others are two objects side by side
 _BOXES = 300  # heaps of boxes
 _LOOSE_YAW, _LOOSE_TILT = np.radians([10.0, 5.0])
@@ -66,10 +65,12 @@ _ODD_TILT = np.radians([22.0, 45.0])
 
 @dataclass(frozen=True)
 class KindSettings(Settings):
-    """Those of training what tells the kind of object."""
+    """Those of training what tells the kind of object. others_licence: of meshes of other kinds;
+    the weights say what they were trained on."""
 
     steps: int = 1200
     batch: int = 64
+    others_licence: str = "not stated"
 
 
 def is_held_out(name: str) -> bool:
@@ -144,7 +145,7 @@ def train_kind(
         sources: dict[str, Any] = provenance([*entries, *shapes])
         for folder in others:
             if count := sum(folder in mesh.parents for mesh in shown):
-                said = {"count": count, "licences": {_LICENCE: count}}
+                said = {"count": count, "licences": {settings.others_licence: count}}
                 sources[f"meshes of other kinds ({folder.name})"] = said
         return write_small_network(out, network, category, settings, sources, scores)
 

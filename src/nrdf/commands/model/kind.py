@@ -17,6 +17,7 @@ def kind(
     out: Folder | None = None,
     others: tuple[Folder, ...] = (),
     leave_out: tuple[Annotated[str, Metavar("WORD")], ...] = (),
+    others_licence: str = "not stated",
     steps: int = 1200,
     seed: int = 0,
     overwrite: bool = False,
@@ -37,6 +38,7 @@ def kind(
         others: What else there is: data folders of other categories, and folders of meshes, +Y up,
             any heading; half of the meshes are kept for `nrdf eval kind`.
         leave_out: Meshes with one of these words in their names are of the category: not shown.
+        others_licence: Licence of the meshes of other kinds, which the weights' metadata name.
         steps: Steps of training, about 0.2 s each.
         seed: Seed of the first weights and of everything drawn.
         overwrite: Start anew in a folder that holds another run.
@@ -44,7 +46,7 @@ def kind(
     from nrdf.field.weights import read_metadata
     from nrdf.training.kind_network import KindSettings, train_kind
 
-    settings = KindSettings(steps=steps, seed=seed)
+    settings = KindSettings(steps=steps, seed=seed, others_licence=others_licence)
     folder = out or Path("runs") / f"{category}-kind"
     with progress_bar("steps") as progress:
         weights = train_kind(
