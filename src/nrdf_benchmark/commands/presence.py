@@ -21,7 +21,7 @@ def presence(
     objects: Folder | None = None,
     model: str = "chair",
     group: tuple[str, ...] = ("chair+stool",),
-    registration: bool = False,
+    seek: str | None = None,
     category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
     pairs: int = 12,
     device: str = "cpu",
@@ -41,7 +41,8 @@ def presence(
         objects: Folder of labelled objects, as of nrdf eval objects.
         group: Categories of labelled objects to take, joined by "+" where they share parts. Only
             those of the first are scanned as well, and aligned by the model.
-        registration: Fit the rule of the model registration, on labelled objects only.
+        seek: Fit the rule of this model instead, on labelled objects only: a zoo name, such as
+            registration or general, or a weight file.
         model: Zoo name, weight file or run, for the labelled objects.
         category: Families: chair, car, plane, or several of them.
         pairs: Pairs of members of each family, about 10 s each on one core.
@@ -66,7 +67,7 @@ def presence(
     every: list[Example] = []
     if objects is not None:
         retrieval, pairs_of_objects = _open_objects(objects, group, model, device)
-        seeker = nrdf.load_model("registration") if registration else retrieval.model
+        seeker = nrdf.load_model(seek, device) if seek else retrieval.model
         chosen = pairs_of_objects[::OBJECT_STEP]
         with progress_bar("parts of objects") as progress:
             for done, (key, other, views) in enumerate(chosen, 1):
@@ -75,7 +76,7 @@ def presence(
                     out, name, partial(examples_of_objects, retrieval, key, other, views, seeker)
                 )
                 progress(done, len(chosen))
-    for name in () if registration else category:
+    for name in () if seek else category:
         scorer = None
         with progress_bar(f"pairs of {name}s") as progress:
             for done, pair in enumerate(choose_pairs(name, pairs), 1):

@@ -42,3 +42,26 @@ def test_what_was_measured_is_fitted_shown_and_used_again(tmp_path, untrained, m
     assert shown.count("family chair") == 2  # those that are there, and those that are absent
     assert cli.run(words) == 0
     assert measured == [3, 7] and capsys.readouterr().out == shown
+
+
+def test_another_model_seeks_the_parts_for_a_rule_of_its_own(tmp_path, monkeypatch, capsys):
+    seekers = []
+
+    def examples(retrieval, reference, target, views, seeker):
+        seekers.append(seeker.preset)
+        return [
+            Example(
+                "objects", "whole", reference, target, part, 0.9 * there, not there, (3, 3, 0, 3)
+            )
+            for part, there in (("leg", True), ("back", False))
+        ]
+
+    pairs = [(f"table/{n}", f"table/{m}", (0,)) for n in "abcd" for m in "abcd" if n != m]
+    monkeypatch.setattr(presence, "examples_of_objects", examples)
+    monkeypatch.setattr(
+        "nrdf_benchmark.commands.presence._open_objects", lambda *asked: (None, pairs)
+    )
+    words = f"eval presence --objects {tmp_path} --seek registration --out {tmp_path / 'p'}"
+    assert cli.run(words.split()) == 0
+    assert seekers == ["registration"] * 4  # every third pair; no family beside them
+    assert "family" not in capsys.readouterr().out
