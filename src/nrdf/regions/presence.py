@@ -52,7 +52,7 @@ class PresenceRule:
 # Logistic regressions of the overlap with the true region, 0 where the target lacks it, on parts
 # of labelled real objects and on members of families, whole and in scans of three views: what
 # `nrdf eval presence` prints (docs/evidence/scans.md).
-FIELD_RULE = PresenceRule(-0.78, Evidence(existence=0.08, trust=0.86, size=0.66, returned=0.46))
+FIELD_RULE = PresenceRule(-0.98, Evidence(existence=0.17, trust=0.77, size=0.71, returned=0.48))
 REGISTRATION_RULE = PresenceRule(
     0.39, Evidence(existence=0.35, trust=1.09, size=2.29, returned=-0.05)
 )

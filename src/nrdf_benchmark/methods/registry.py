@@ -59,9 +59,9 @@ METHODS = {
     "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
     "imdc": Entry("IMDC, its inverse's points snapped", "imdc", "imdc"),
     "nrdf-paper": Entry("NRDF as in the paper, C's points snapped (eq. 9)", "paper", "paper"),
-    "nrdf": Entry("the default field, region as a mask", "default"),
+    "nrdf": Entry("the category's own field, region as a mask", "default"),
     "nrdf-refined": Entry("the same, moved onto the target in a few steps", "default"),
-    "nrdf-points": Entry("the default field, C's points snapped (eq. 9)", "default"),
+    "nrdf-points": Entry("the category's own field, C's points snapped (eq. 9)", "default"),
 }
 """By name, in the order of the paper's table: nothing learned, rivals, ours."""
 
@@ -167,14 +167,17 @@ def _find_method(
     else:
         path = _trained(name, entry, category, runs)
     metadata = read_metadata(path)
-    needed = {"preset": entry.preset}
+    needed = {"preset": [entry.preset]}
     if not entry.any_category:
-        needed["category"] = category
+        needed["category"] = [category]
+        if entry.run is None:  # a category's own model may be the general one, trained further
+            needed["preset"].append("general")
     for kind, wanted in needed.items():
-        if metadata.get(kind) != wanted:
+        if metadata.get(kind) not in wanted:
             raise ModelError(
-                f"method '{name}' on category {category} needs weights of {kind} '{wanted}', but "
-                f"{path} holds {kind} '{metadata.get(kind)}'; give others with --model {name}=PATH"
+                f"method '{name}' on category {category} needs weights of {kind} "
+                f"'{wanted[0]}', but {path} holds {kind} '{metadata.get(kind)}'; give others with "
+                f"--model {name}=PATH"
             )
     return MethodSpec(name, path.resolve(), _sha256(path), device)
 
