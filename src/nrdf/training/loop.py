@@ -43,7 +43,7 @@ from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
-from nrdf.training.validation import validate
+from nrdf.training.validation import ignores_embedding, validate
 from nrdf.training.weights import averaged, start_with, to_device, update_average
 
 log = logging.getLogger(__name__)
@@ -221,6 +221,12 @@ def run_stages(
                     with averaged(field, average):
                         scores = validate(field, validation)
                     display.report(stage.name, position.total, scores)
+                    if ignores_embedding(scores):
+                        log.warning(
+                            "step %d: occupancy is as good with another shape's embedding, so the "
+                            "field knows no shape yet; if that stays so, train at a lower rate",
+                            position.total,
+                        )
                 if workers.first and (
                     position.total % config.checkpoint_every == 0 or last or interrupted.is_set()
                 ):

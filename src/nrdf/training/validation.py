@@ -11,6 +11,8 @@ from nrdf.training.dataset import ShapeDataset
 
 STEPS = 8
 BATCH = 8
+_KNOWN = 0.2  # intersection over union from which something has been learned
+_AS_GOOD = 0.98
 
 
 @torch.no_grad()
@@ -19,9 +21,9 @@ def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
 
     `val/error`: mean distance between predicted and known corresponding points (canonical
     lengths); `val/copy`: that of leaving every point where it is; `val/iou`: intersection over
-    union of predicted and true occupancy over the queries. With several pools, the error of each
-    as well. Scores that the shapes give no ground for are left out, and errors of a field without
-    an inverse.
+    union of predicted and true occupancy over the queries; `val/iou other`: the same, predicted
+    with the embedding of another shape. With several pools, the error of each as well. Scores that
+    the shapes give no ground for are left out, and errors of a field without an inverse.
     """
     training = {module: module.training for module in field.modules()}
     field.eval()
@@ -41,6 +43,7 @@ def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
             scores[f"val/error {pattern}"] = found["error"] / found["weight"]
     if every["either"] > 0:
         scores["val/iou"] = every["inside"] / every["either"]
+        scores["val/iou other"] = every["inside other"] / max(every["either other"], 1.0)
     return scores
 
 
@@ -59,7 +62,16 @@ def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
             sums["error"] += float((apart.norm(dim=-1) * batch.weight).sum())
             sums["copy"] += float((copied.norm(dim=-1) * batch.weight).sum())
             sums["weight"] += float(batch.weight.sum())
-        guess, truth = field.occupancy(z, batch.queries) > 0, batch.occupancy > 0.5
-        sums["inside"] += float((guess & truth).sum())
-        sums["either"] += float((guess | truth).sum())
+        truth = batch.occupancy > 0.5
+        for of, embedding in (("", z), (" other", z.roll(1, 0))):
+            guess = field.occupancy(embedding, batch.queries) > 0
+            sums[f"inside{of}"] += float((guess & truth).sum())
+            sums[f"either{of}"] += float((guess | truth).sum())
     return sums
+
+
+def ignores_embedding(scores: dict[str, float]) -> bool:
+    """Whether occupancy is as good with the embedding of another shape: the field has learned the
+    mean shape, and what rests on embeddings, such as cross reconstruction, can learn nothing."""
+    own, other = scores.get("val/iou", 0.0), scores.get("val/iou other", 0.0)
+    return own > _KNOWN and other > _AS_GOOD * own

@@ -30,7 +30,7 @@ def train(
     Args:
         category: What the shapes are; all of them must be of it.
         data: Data folders (of `nrdf model prepare`, `synth` or `boxes`).
-        preset: default, chair, car, paper, ndf, imdc, or one of the last three with -short:
+        preset: default, chair, paper, ndf, imdc, or one of the last three with -short:
             the configuration of that name, whose file says what it costs.
         config: A configuration file of your own, instead of a preset.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
