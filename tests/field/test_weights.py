@@ -192,15 +192,3 @@ def test_a_place_that_cannot_be_written_is_an_output_error(tmp_path):
 def test_a_category_is_needed(tmp_path):
     with pytest.raises(ValueError, match="category"):
         save_weights(tmp_path / "x", build_field("tiny"), {})
-
-
-def test_files_from_before_a_part_was_renamed_still_load():
-    path = find_weights("chair")
-    metadata, tensors = load_tensors(path)
-    assert "look_blocks" in metadata["field"] and "inverse.look.weight" in tensors
-    field = load_weights(path)[0]
-    assert field.config.refine_blocks == metadata["field"]["look_blocks"]
-    state = field.state_dict()
-    assert torch.equal(state["inverse.refine.weight"], tensors["inverse.look.weight"].float())
-    old, new = "inverse.look_blocks.0.inner.bias", "inverse.refine_blocks.0.inner.bias"
-    assert torch.equal(state[new], tensors[old].float())

@@ -9,9 +9,8 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.sampling import downsample, indices_in_subset
+from nrdf.geometry.sampling import downsample, indices_in_subset, search_threads
 from nrdf.geometry.similarity import Similarity
-from nrdf.geometry.threads import search_threads
 from nrdf.geometry.visibility import seen_from_both_sides
 from nrdf.io.cloud import PointCloud
 

@@ -25,12 +25,6 @@ FORMAT = "nrdf-weights-1"
 LARGEST = 500_000_000
 """Bytes that a weight file may have."""
 _TYPES = {torch.float16, torch.float32, torch.float64, torch.int64, torch.int32, torch.uint8}
-_RENAMED = {
-    "look_blocks": "refine_blocks",
-    "inverse.look_blocks.": "inverse.refine_blocks.",
-    "inverse.look.": "inverse.refine.",
-}
-"""Sizes, and beginnings of tensors' names, in older weight files; what they are called now."""
 _Module = TypeVar("_Module", bound=nn.Module)
 
 
@@ -80,17 +74,7 @@ def load_weights(
                 f"load it as '{metadata.get(key)}' or give another file"
             )
     name = metadata["preset"]
-    sizes = {_current_name(size): value for size, value in metadata["field"].items()}
-    tensors = {_current_name(key): value for key, value in tensors.items()}
-    return fill(path, name, tensors, lambda: build_field(name, sizes)), metadata
-
-
-def _current_name(name: str) -> str:
-    """The name that a size or a tensor has now, from that in a file."""
-    for old, new in _RENAMED.items():
-        if name.startswith(old):
-            return new + name.removeprefix(old)
-    return name
+    return fill(path, name, tensors, lambda: build_field(name, metadata["field"])), metadata
 
 
 def fill(

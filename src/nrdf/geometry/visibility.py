@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.sampling import fibonacci_directions
-from nrdf.geometry.threads import search_threads
+from nrdf.geometry.sampling import fibonacci_directions, search_threads
 
 _BOTH_SIDES = 0.4  # directions that see a point from its far side, to those from its near side
 # Share of points seen from both sides from which a cloud is open: whole chairs and aircraft have

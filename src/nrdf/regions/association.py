@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
-from nrdf.geometry.threads import search_threads
+from nrdf.geometry.sampling import search_threads
 
 VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""

@@ -23,7 +23,7 @@ def test_files_hold_the_tables_and_everything(tmp_path):
     paths = report.write(tmp_path)
     assert [path.name for path in paths] == ["objects.md", "objects.csv", "objects.json"]
     text = paths[0].read_text()
-    assert "| `nrdf`: the default field, region as a mask | 0.600 | 0.000 | 0.400 |" in text
+    assert "| `nrdf`: the category's own field, region as a mask | 0.600 | 0.000 | 0.400 |" in text
     assert "less registration" not in text  # two targets are too few
     content = json.loads(paths[2].read_text(), parse_constant=pytest.fail)
     assert content["command"] == "nrdf eval objects" and content["rows"][-1]["mean"] is None

@@ -116,7 +116,10 @@ def test_it_trains_on_occupancy_and_is_not_asked_for_correspondence(
     )
     path = train(config, [tmp_path / "data"], tmp_path / "run", category="ball", device="cpu")
     built, metadata = load_weights(path, "ndf", "ball")
-    assert built.config.encoder_points == 64 and set(metadata["scores"]) == {"val/iou", "val/iou other"}
+    assert built.config.encoder_points == 64 and set(metadata["scores"]) == {
+        "val/iou",
+        "val/iou other",
+    }
     logged = [json.loads(line) for line in (tmp_path / "run/metrics.jsonl").open()]
     losses = [line["loss/occupancy"] for line in logged if "loss/occupancy" in line]
     assert losses[-1] < 0.9 * losses[0]
