@@ -15,12 +15,10 @@ from nrdf.field import PRESETS, build_field
 from nrdf.field.weights import (
     FORMAT,
     _digest,
-    load_tensors,
     load_weights,
     read_metadata,
     save_weights,
 )
-from nrdf.field.zoo import find_weights
 
 
 @pytest.fixture(autouse=True)
