@@ -49,8 +49,8 @@ def bsrc(
     picture; interrupted, the same command goes on where it was.
 
     Methods: copy, box, copy-normals, box-normals, box-mask, registration (nothing learned); ndf,
-    ndf-energy, imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the default
-    field); general (the field for every category); registration-model.
+    ndf-energy, imdc, nrdf-paper (trained rivals); nrdf, nrdf-refined, nrdf-points (the
+    category's own field); general (the field for every category); registration-model.
 
     Example: nrdf eval bsrc --data bsrc/ --category chair --method nrdf copy box --out results/
 
@@ -60,7 +60,7 @@ def bsrc(
         out: Folder for tables, figures of every pair, and a picture of the best learned method.
         method: Methods to run, rows of the table.
         model: METHOD=PATH of a weight file or run for a learned method; a zoo name or path alone
-            is for those of the default field, which otherwise have the category's model in the zoo.
+            is for the three nrdf ones, which otherwise have the category's model in the zoo.
         runs: Where the rivals were trained: RUNS/CATEGORY-PRESET, presets ndf, imdc, paper;
             what is not there comes with the benchmark, where it is small enough.
         labels: As published, or corrected (plane5's wing regions are swapped as published).
