@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 
 import numpy as np
@@ -14,7 +13,6 @@ from nrdf.geometry.sampling import (
     downsample,
     fibonacci_directions,
     indices_in_subset,
-    search_threads,
     spread_in_triangles,
 )
 
@@ -93,21 +91,3 @@ def test_places_lie_in_their_triangles_and_fill_them_evenly():
         assert abs((places[:, axis] > 0.5).mean() - 0.25) < 0.01
     assert abs((places.sum(axis=1) < 0.5).mean() - 0.25) < 0.01
     np.testing.assert_allclose(places.mean(axis=0), [1 / 3, 1 / 3, 0], atol=0.005)
-
-
-@pytest.mark.parametrize(("asked", "threads"), [("3", 3), ("4,2", 4), (" 1 ", 1)])
-def test_as_many_as_are_asked_for(
-    monkeypatch: pytest.MonkeyPatch, asked: str, threads: int
-) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", asked)
-    assert search_threads() == threads
-
-
-@pytest.mark.parametrize("asked", [None, "", "0", "-2", "many"])
-def test_else_as_many_as_there_are_cores(
-    monkeypatch: pytest.MonkeyPatch, asked: str | None
-) -> None:
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    if asked is not None:
-        monkeypatch.setenv("OMP_NUM_THREADS", asked)
-    assert search_threads() == os.cpu_count()

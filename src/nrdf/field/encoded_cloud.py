@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.sampling import downsample, indices_in_subset, search_threads
+from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.visibility import seen_from_both_sides
 from nrdf.io.cloud import PointCloud
@@ -100,24 +100,20 @@ class EncodedCloud:
         """The position in `working` of the point nearest to each point of the cloud."""
         if self.is_whole:
             return self.working
-        return cKDTree(self.points).query(
-            self.canonical(self.cloud.points), workers=search_threads()
-        )[1]
+        return cKDTree(self.points).query(self.canonical(self.cloud.points))[1]
 
     def distance(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """Distance (m,) of canonical points and normals (m, 3) from the working points, in position
         and weighted normal."""
         features = oriented_features(points, normals, NORMAL_WEIGHT)
-        return self._oriented_tree.query(features, workers=search_threads())[0]
+        return self._oriented_tree.query(features)[0]
 
     def nearest(self, points: np.ndarray, normals: np.ndarray, count: int) -> np.ndarray:
         """The `count` working points (m, count) that are nearest to canonical points and normals
         (m, 3), in position and weighted normal."""
         features = oriented_features(points, normals, NORMAL_WEIGHT)
         wanted = np.arange(1, min(count, len(self.points)) + 1)
-        return np.asarray(
-            self._oriented_tree.query(features, k=wanted, workers=search_threads())[1]
-        )
+        return np.asarray(self._oriented_tree.query(features, k=wanted)[1])
 
     @cached_property
     def _oriented_tree(self) -> cKDTree:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from nrdf.geometry.canonical import bounding_box
@@ -120,12 +118,3 @@ def spread_in_triangles(corners: np.ndarray) -> np.ndarray:
     one, other = np.where(folded, 1.0 - one, one), np.where(folded, 1.0 - other, other)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.asarray(a + one * (b - a) + other * (c - a))
-
-
-def search_threads() -> int:
-    """OMP_NUM_THREADS where it is a whole number above 0, as for matrix products; else the number
-    of cores. For `workers` of SciPy's k-d tree, whose results do not depend on it."""
-    asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
-    if asked.isdecimal() and int(asked) > 0:
-        return int(asked)
-    return os.cpu_count() or 1

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.sampling import fibonacci_directions, search_threads
+from nrdf.geometry.sampling import fibonacci_directions
 
 _BOTH_SIDES = 0.4  # directions that see a point from its far side, to those from its near side
 # Share of points seen from both sides from which a cloud is open: whole chairs and aircraft have
@@ -135,7 +135,7 @@ def nearest_points(points: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarr
     tree = cKDTree(points)
     # Asked in the tree's own order, neighbours find what they need in the processor's cache.
     order = tree.indices
-    found, near = tree.query(points[order], np.arange(1, count + 1), workers=search_threads())
+    found, near = tree.query(points[order], np.arange(1, count + 1))
     distance = np.empty(found.shape, np.float32)
     index = np.empty_like(near)
     distance[order], index[order] = found, near

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
-from nrdf.geometry.sampling import search_threads
 
 VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""
@@ -28,9 +27,7 @@ def snap(
     is above 0.
     """
     tree = cKDTree(oriented_features(target, target_normals, normal_weight))
-    distance, index = tree.query(
-        oriented_features(mapped, mapped_normals, normal_weight), workers=search_threads()
-    )
+    distance, index = tree.query(oriented_features(mapped, mapped_normals, normal_weight))
     return index, distance
 
 
@@ -51,6 +48,5 @@ def nearest_voters(
     distance, index = tree.query(
         oriented_features(target, target_normals, normal_weight),
         k=np.arange(1, min(count, len(mapped)) + 1),
-        workers=search_threads(),
     )
     return index, distance
