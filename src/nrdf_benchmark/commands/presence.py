@@ -22,7 +22,7 @@ def presence(
     model: str = "chair",
     group: tuple[str, ...] = ("chair+stool",),
     seek: str | None = None,
-    category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "car", "plane"),
+    category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "plane"),
     pairs: int = 12,
     device: str = "cpu",
 ) -> None:
@@ -44,7 +44,8 @@ def presence(
         seek: Fit the rule of this model instead, on labelled objects only: a zoo name, such as
             registration or general, or a weight file.
         model: Zoo name, weight file or run, for the labelled objects.
-        category: Families: chair, car, plane, or several of them.
+        category: Families: chair, car, plane, or several of them. The zoo's cars are mapped by the
+            general model, whose evidence is of another kind.
         pairs: Pairs of members of each family, about 10 s each on one core.
         device: cpu, cuda, cuda:N or auto.
     """
