@@ -6,17 +6,9 @@ import pytest
 import torch
 from torch.nn import functional
 
+from builders.small_paper import SMALL
 from nrdf.field import build_field
 from nrdf.field.paper import PaperConfig, PaperField
-
-SMALL = {
-    "residual_size": 8,
-    "convolution_size": 12,
-    "point_features": 4,
-    "decoder_width": 16,
-    "decoder_blocks": 2,
-    "inverse_widths": (24, 16, 8),
-}
 
 
 def cloud(b: int, n: int, seed: int = 0):

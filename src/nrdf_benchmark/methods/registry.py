@@ -85,11 +85,10 @@ def find_methods(
 ) -> list[MethodSpec]:
     """The methods of some names, in their order, with the weights that they need for a category.
 
-    models: METHOD=PATH for single methods, or a zoo name or path alone for those of the default
-    field. Weights of others are looked for in `runs`/CATEGORY-PRESET, then in the benchmark's own
-    `ZOO`. Raises ConfigError for a name
-    that is not known or given twice, ModelError for weights that are not there or of another
-    category or preset, naming the file.
+    models: METHOD=PATH for single methods, or a zoo name or path alone for those of the category's
+    own field. Weights of others are looked for in `runs`/CATEGORY-PRESET, then in the benchmark's
+    own `ZOO`. Raises ConfigError for a name that is not known or given twice, ModelError for
+    weights that are not there or of another category or preset, naming the file.
     """
     for name in names:
         if name not in METHODS:
@@ -137,7 +136,7 @@ def _build(spec: MethodSpec) -> Method:
 
 
 def _chosen_models(models: Sequence[str]) -> dict[str, str]:
-    """Method name to weights; the key "" for those of the default field."""
+    """Method name to weights; the key "" for those of the category's own field."""
     chosen = {}
     for word in models:
         name, equals, path = word.partition("=")

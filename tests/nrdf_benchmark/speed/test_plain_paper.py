@@ -5,20 +5,13 @@ from __future__ import annotations
 import pytest
 import torch
 
+from builders.small_paper import SMALL
 from builders.tiny_field import balls, tiny_config
 from nrdf.field import build_field
 from nrdf.training.dataset import ShapeDataset
 from nrdf.training.losses import LOSSES, LossContext
 from nrdf_benchmark.speed.plain_paper import PlainPaper
 
-SMALL = {
-    "residual_size": 8,
-    "convolution_size": 12,
-    "point_features": 4,
-    "decoder_width": 16,
-    "decoder_blocks": 2,
-    "inverse_widths": (24, 16, 8),
-}
 NAMES = (
     "occupancy",
     "self",
