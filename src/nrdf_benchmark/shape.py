@@ -214,11 +214,12 @@ def _run(task: _Task) -> ShapeScore:
             f"{task.path} is of category {shape.category}, others are of {task.category}; give a "
             "folder of one category"
         )
-    return score_shape(_model(task.spec), shape, task.settings)
+    return score_shape(model_of(task.spec), shape, task.settings)
 
 
 @lru_cache(maxsize=1)
-def _model(spec: MethodSpec) -> Model:
+def model_of(spec: MethodSpec) -> Model:
+    """The model of a learned method; the last one is kept. Raises as reading weights does."""
     assert spec.weights is not None  # check_methods lets no others pass
     return nrdf.load_model(spec.weights, spec.device)
 

@@ -63,3 +63,17 @@ def test_a_field_that_ignores_what_it_encodes_is_told():
     assert mean["val/iou"] == mean["val/iou other"] > 0.2
     assert ignores_embedding(mean) and not ignores_embedding(knowing)
     assert not ignores_embedding({"val/error": 0.1})
+
+
+class KnowsTheMeanBesides(KnowsExtents):
+    """Its descriptors are made of one ellipsoid; the occupancy that it tells is right."""
+
+    def coarse_occupancy(self, z, queries):
+        return self.occupancy(z.mean(0, keepdim=True).expand(len(z), -1), queries)
+
+
+def test_what_descriptors_are_made_of_is_scored_where_it_is_another_occupancy():
+    shapes = [Ball(f"b{i}", radii=(0.5, 0.15 + 0.1 * i, 0.45 - 0.1 * i)) for i in range(4)]
+    scores = validate(KnowsTheMeanBesides(), tiny_dataset(shapes))
+    assert scores["val/iou"] > 0.8 > scores["val/iou coarse"] == scores["val/iou other"]
+    assert ignores_embedding(scores)

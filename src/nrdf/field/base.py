@@ -70,6 +70,11 @@ class Field(nn.Module, ABC):
     def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
         """Logits (b, q) that queries (b, q, 3) lie inside the shapes of embeddings z (b, d_z)."""
 
+    def coarse_occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
+        """The same by what descriptors are made of alone, where a field tells occupancy apart from
+        them; otherwise `occupancy`."""
+        return self.occupancy(z, queries)
+
     @abstractmethod
     def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> Tensor:
         """Descriptors k (b, m, d_k) of points (b, m, 3) with normals, on the shapes of z."""

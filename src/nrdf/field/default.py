@@ -7,6 +7,9 @@ descriptor, inverse C) and changes what was measured to matter:
   stall), and keeps local features of the shape on three axis-aligned feature planes beside the
   global latent (planes as in Convolutional Occupancy Networks, Peng et al., ECCV 2020);
 - the descriptor of a point carries its normal, so that the two sides of a thin part differ;
+- B's occupancy is only what descriptors are made of. The occupancy that the field tells comes from
+  the cloud's own points near the place (`nrdf.field.local_occupancy`): one code for a whole shape
+  leaves thin parts in doubt;
 - C predicts a displacement from half-way between the reference point and its copy in the target's
   bounding box (coarse), then samples the target's local features there and corrects itself once
   (refine). It is one forward pass: nothing is optimised for a pair.
@@ -22,6 +25,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from nrdf.field.base import Field, FieldConfig, Inverse
+from nrdf.field.local_occupancy import LocalOccupancy
 
 _PLANE_AXES = ((0, 1), (1, 2), (2, 0))
 _PLANE_SIDE = 1.1  # canonical side that a plane covers: the unit box and a margin
@@ -42,13 +46,16 @@ class DefaultConfig(FieldConfig):
     """Octaves of the positional encoding."""
     decoder_width: int = 128
     decoder_blocks: int = 2
+    occupancy_width: int = 64
+    """Width of what tells occupancy by the points nearby; divisible by 8."""
     inverse_width: int = 192
     inverse_blocks: int = 2
     refine_blocks: int = 2
 
 
 class DefaultField(Field):
-    """Embedding z = [latent, extents of the bounding box (3), feature planes], flattened."""
+    """Embedding z = [latent, extents of the bounding box (3), feature planes, the points that the
+    encoder saw with their normals], flattened."""
 
     preset = "default"
     Config: ClassVar[type[FieldConfig]] = DefaultConfig
@@ -59,11 +66,17 @@ class DefaultField(Field):
         self.encoder = Encoder(self.config)
         self.decoder = Decoder(self.config)
         self.inverse = InverseDescriptor(self.config, self.decoder.descriptor_size)
+        self.local_occupancy = LocalOccupancy(self.config.occupancy_width)
 
     def embed(self, points: Tensor, normals: Tensor) -> Tensor:
-        return self.encoder(points, normals)
+        z = self.encoder(points, normals)
+        return torch.cat([z, points.flatten(1), normals.flatten(1)], dim=1)
 
     def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
+        points, normals = z[:, self._coded :].unflatten(1, (2, -1, 3)).unbind(1)
+        return self.local_occupancy(queries, points, normals)
+
+    def coarse_occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
         latent, _, planes = self._split(z)
         return self.decoder(latent, sample_planes(planes, queries), queries)[1]
 
@@ -80,9 +93,16 @@ class DefaultField(Field):
 
     def _split(self, z: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         config = self.config
-        latent, extents, planes = z.split([config.latent, 3, z.shape[1] - config.latent - 3], dim=1)
         cells = config.plane_cells
+        sizes = [config.latent, 3, self._coded - config.latent - 3]
+        latent, extents, planes = z[:, : self._coded].split(sizes, dim=1)
         return latent, extents, planes.unflatten(1, (3, config.plane_channels, cells, cells))
+
+    @property
+    def _coded(self) -> int:
+        """Length of z before the points."""
+        config = self.config
+        return config.latent + 3 + 3 * config.plane_channels * config.plane_cells**2
 
 
 class Encoder(nn.Module):

@@ -13,7 +13,8 @@ The paper's parts, for pairs of shapes of any kind:
   points move as the tokens around them do.
 
 Nothing is optimised for a pair; `nrdf.regions.registration_mapper` does a few steps of that
-afterwards, because the tokens are 0.05 apart. There is no occupancy.
+afterwards, because the tokens are 0.05 apart. Occupancy comes from the points near a place
+(`nrdf.field.local_occupancy`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from torch import Tensor, nn
 
 from nrdf.errors import ModelError
 from nrdf.field.base import Field, FieldConfig, Inverse
+from nrdf.field.local_occupancy import LocalOccupancy
 from nrdf.field.pair_inverse import PairInverse, Places, Tokens, half_way
 from nrdf.field.tokens import GEOMETRY, farthest_points, gather, squared_distances, surroundings
 
@@ -46,10 +48,13 @@ class GeneralConfig(FieldConfig):
     heads: int = 4
     looks: int = 5
     """Blocks of self- and cross-attention."""
+    occupancy_width: int = 64
+    """Width of what tells occupancy; divisible by 8."""
 
 
 class GeneralField(Field):
-    """Embedding z = the tokens' points, normals and features, and the bounding box, flattened."""
+    """Embedding z = the tokens' points, normals and features, the bounding box, and the points that
+    the encoder saw with their normals, flattened."""
 
     preset = GENERAL
     inverts = False
@@ -61,16 +66,19 @@ class GeneralField(Field):
         self.encoder = TokenEncoder()
         sizes = self.config
         self.inverse = PairInverse(2 * _POINT_FEATURES, sizes.width, sizes.heads, sizes.looks)
+        self.local_occupancy = LocalOccupancy(sizes.occupancy_width)
 
     def embed(self, points: Tensor, normals: Tensor) -> Tensor:
         order = torch.randperm(points.shape[1], generator=torch.Generator().manual_seed(0))
         points, normals = points[:, order.to(points.device)], normals[:, order.to(points.device)]
         chosen = farthest_points(points, self.config.tokens)
-        return pack(self.encoder(points, normals, chosen))
+        z = pack(self.encoder(points, normals, chosen))
+        return torch.cat([z, points.flatten(1), normals.flatten(1)], dim=1)
 
-    def occupancy(self, z: Tensor, queries: Tensor) -> NoReturn:
-        """Raises ModelError."""
-        raise _needs_pair("occupancy")
+    def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
+        seen = z[:, sum(_sizes(self.config.tokens)) :]
+        points, normals = seen.unflatten(1, (2, -1, 3)).unbind(1)
+        return self.local_occupancy(queries, points, normals)
 
     def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> NoReturn:
         """Raises ModelError: descriptors belong to a pair (`transfer`)."""
@@ -154,14 +162,19 @@ def pack(tokens: Tokens) -> Tensor:
 
 
 def unpack(z: Tensor, count: int) -> Tokens:
-    """The tokens of rows (b, d_z)."""
-    sizes = [3 * count, 3 * count, 2 * _POINT_FEATURES * count, 3, 3]
-    points, normals, features, low, high = z.split(sizes, dim=1)
+    """The tokens of rows (b, d_z) that begin with them."""
+    sizes = _sizes(count)
+    points, normals, features, low, high = z[:, : sum(sizes)].split(sizes, dim=1)
 
     def each(values: Tensor) -> Tensor:
         return values.unflatten(1, (count, -1))
 
     return Tokens(each(points), each(normals), each(features), low, high)
+
+
+def _sizes(count: int) -> list[int]:
+    """Numbers that each part of `pack` has for so many tokens."""
+    return [3 * count, 3 * count, 2 * _POINT_FEATURES * count, 3, 3]
 
 
 def _needs_pair(what: str) -> ModelError:

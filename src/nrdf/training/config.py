@@ -119,6 +119,8 @@ class TrainConfig(StrictModel):
     preset: str
     field: dict[str, Any] = Field(default={})
     """Sizes that differ from the preset's."""
+    start_parts: dict[str, str] = Field(default={})
+    """Part of the field to the model (zoo name, weight file or run) whose part it starts as."""
     stages: list[Stage] = Field(min_length=1)
     data: DataConfig = DataConfig()
     optimizer: OptimizerConfig = OptimizerConfig()

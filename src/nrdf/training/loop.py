@@ -22,6 +22,7 @@ from nrdf.errors import ConfigError, DataError, TrainingError, unknown_name
 from nrdf.field import build_field
 from nrdf.field.base import Field
 from nrdf.field.device import choose_precision
+from nrdf.field.general import GENERAL
 from nrdf.field.weights import save_weights
 from nrdf.field.zoo import find_weights
 from nrdf.io.locks import write_lock
@@ -44,7 +45,7 @@ from nrdf.training.losses import LOSSES, LossContext
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import ignores_embedding, validate
-from nrdf.training.weights import averaged, start_with, to_device, update_average
+from nrdf.training.weights import averaged, start_parts, start_with, to_device, update_average
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +64,8 @@ def train(
     begin: str | Path | None = None,
     start: str | Path | None = None,
 ) -> Path:
-    """Train a field for one category and export its weights; returns the weight file's path.
+    """Train a field for one category, or for "general" of any, and export its weights; returns the
+    weight file's path.
 
     `data` are folders with an `index.csv`, `out` is the run's folder. Started again with the same
     arguments after whatever ended it, a run goes on from its newest checkpoint, to the same
@@ -81,7 +83,7 @@ def train(
     with join_workers(device) as workers, write_lock(out) if workers.first else nullcontext():
         entries = list_shapes([Path(folder) for folder in data])
         dataset = load_dataset(entries, "train", config.data, workers.device)
-        if dataset.categories != {category}:
+        if category != GENERAL and dataset.categories != {category}:
             found = ", ".join(sorted(dataset.categories))
             raise DataError(f"the shapes are of category {found}, not {category}")
         validation = None
@@ -99,12 +101,12 @@ def train(
                 path,
                 field,
                 {
-                    "category": category,
+                    "category": "" if category == GENERAL else category,
                     "train": config.model_dump(mode="json"),
                     "shapes": provenance(entries),
                     "scores": scores,
                     "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-                    **({} if start is None else {"start": identity["start"]}),
+                    **{key: identity[key] for key in ("start", "start_parts") if key in identity},
                     **environment(workers),
                 },
             )
@@ -121,10 +123,16 @@ def run_identity(
     content = config.model_dump(mode="json")
     identity = {"config": content, "category": category, "shapes": list(shapes)}
     if start is not None:
-        file = find_weights(start)
-        checksum = hashlib.sha256(file.read_bytes()).hexdigest()
-        identity["start"] = {"file": file.name, "sha256": checksum}
+        identity["start"] = _file_identity(start)
+    if config.start_parts:
+        found = {name: _file_identity(model) for name, model in config.start_parts.items()}
+        identity["start_parts"] = found
     return identity
+
+
+def _file_identity(model: str | Path) -> dict[str, str]:
+    file = find_weights(model)
+    return {"file": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
 
 
 def run_stages(
@@ -143,6 +151,7 @@ def run_stages(
     field = build_field(config.preset, config.field).to(workers.device)
     if start is not None:
         start_with(field, start)
+    start_parts(field, config.start_parts)
     check_parts(config, field)
     lengths = [
         stage_steps(stage, dataset.with_pools(stage.pools), workers.world)

@@ -143,6 +143,12 @@ def occupancy(context: LossContext) -> Tensor:
     return functional.binary_cross_entropy_with_logits(context.logits, context.batch.occupancy)
 
 
+def coarse_occupancy(context: LossContext) -> Tensor:
+    """`occupancy`, by what descriptors are made of alone (`Field.coarse_occupancy`)."""
+    logits = context.field.coarse_occupancy(context.z, context.batch.queries).float()
+    return functional.binary_cross_entropy_with_logits(logits, context.batch.occupancy)
+
+
 def self_reconstruction(context: LossContext) -> Tensor:
     """(2): ‖C(z_i, θ(z_i, x)) − x‖², averaged over points x of shape i."""
     return (context.self_reconstruction - context.cloud).square().sum(-1).mean()
@@ -254,6 +260,7 @@ def error_scale(context: LossContext) -> Tensor:
 
 LOSSES: dict[str, Callable[[LossContext], Tensor]] = {
     "occupancy": occupancy,
+    "coarse_occupancy": coarse_occupancy,
     "self": self_reconstruction,
     "chamfer": chamfer,
     "emd": emd,

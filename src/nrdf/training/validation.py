@@ -21,9 +21,11 @@ def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
 
     `val/error`: mean distance between predicted and known corresponding points (canonical
     lengths); `val/copy`: that of leaving every point where it is; `val/iou`: intersection over
-    union of predicted and true occupancy over the queries; `val/iou other`: the same, predicted
-    with the embedding of another shape. With several pools, the error of each as well. Scores that
-    the shapes give no ground for are left out, and errors of a field without an inverse.
+    union of predicted and true occupancy over the queries; `val/iou coarse`: of what descriptors
+    are made of alone (`Field.coarse_occupancy`), where that is another one; `val/iou other`: the
+    last of these, predicted with the embedding of another shape. With several pools, the error of
+    each as well. Scores that the shapes give no ground for are left out, and errors of a field
+    without an inverse.
     """
     training = {module: module.training for module in field.modules()}
     field.eval()
@@ -43,6 +45,8 @@ def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
             scores[f"val/error {pattern}"] = found["error"] / found["weight"]
     if every["either"] > 0:
         scores["val/iou"] = every["inside"] / every["either"]
+        if type(field).coarse_occupancy is not Field.coarse_occupancy:
+            scores["val/iou coarse"] = every["inside coarse"] / max(every["either coarse"], 1.0)
         scores["val/iou other"] = every["inside other"] / max(every["either other"], 1.0)
     return scores
 
@@ -63,8 +67,12 @@ def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
             sums["copy"] += float((copied.norm(dim=-1) * batch.weight).sum())
             sums["weight"] += float(batch.weight.sum())
         truth = batch.occupancy > 0.5
-        for of, embedding in (("", z), (" other", z.roll(1, 0))):
-            guess = field.occupancy(embedding, batch.queries) > 0
+        for of, told, embedding in (
+            ("", field.occupancy, z),
+            (" coarse", field.coarse_occupancy, z),
+            (" other", field.coarse_occupancy, z.roll(1, 0)),
+        ):
+            guess = told(embedding, batch.queries) > 0
             sums[f"inside{of}"] += float((guess & truth).sum())
             sums[f"either{of}"] += float((guess | truth).sum())
     return sums
@@ -73,5 +81,6 @@ def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
 def ignores_embedding(scores: dict[str, float]) -> bool:
     """Whether occupancy is as good with the embedding of another shape: the field has learned the
     mean shape, and what rests on embeddings, such as cross reconstruction, can learn nothing."""
-    own, other = scores.get("val/iou", 0.0), scores.get("val/iou other", 0.0)
+    own = scores.get("val/iou coarse", scores.get("val/iou", 0.0))
+    other = scores.get("val/iou other", 0.0)
     return own > _KNOWN and other > _AS_GOOD * own

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -25,12 +25,34 @@ def start_with(field: Field, model: str | Path) -> None:
     field.load_state_dict(given.state_dict())
 
 
+def start_parts(field: Field, models: Mapping[str, str]) -> None:
+    """Give parts of a field, by name, the weights that models have in theirs. Raises ConfigError
+    where one of them has no such part, or one of other sizes."""
+    for name, model in models.items():
+        parts, given = field.parts(), load_field(model)[0].parts()
+        if name not in parts or name not in given:
+            common = ", ".join(part for part in parts if part in given) or "none"
+            raise ConfigError(
+                f"start_parts: no part '{name}' in both the field and {model}; in both: {common}"
+            )
+        try:
+            parts[name].load_state_dict(given[name].state_dict())
+        except RuntimeError:
+            raise ConfigError(
+                f"start_parts: the part '{name}' of {model} is of other sizes than the field's"
+            ) from None
+
+
 @torch.no_grad()
 def update_average(average: dict[str, Tensor], field: nn.Module, decay: float, step: int) -> None:
-    """Move the average towards the field's weights; faster at first, while it knows little."""
+    """Move the average towards the field's weights; faster at first, while it knows little. That of
+    parts which are frozen (in evaluation mode) stays what it was when they were trained last."""
     decay = min(decay, (1 + step) / (10 + step))
     floating, towards = [], []
+    frozen = {name for name, part in field.named_children() if not part.training}
     for name, value in field.state_dict().items():
+        if name.partition(".")[0] in frozen:
+            continue
         if value.is_floating_point():
             floating.append(average[name])
             towards.append(value)

@@ -48,7 +48,8 @@ def shape(
         device: cpu, cuda, cuda:N or auto.
         workers: Processes; all cores unless given, one on a GPU.
         cluster: Address of a Dask scheduler whose workers do it instead.
-        out: Folder for the table (Markdown), and every shape's figures (CSV, JSON).
+        out: Folder for the table (Markdown), every shape's figures (CSV, JSON), and a picture of
+            some surfaces (PNG).
     """
     from nrdf.training.provenance import git_commit
     from nrdf_benchmark.methods.registry import find_methods
@@ -60,6 +61,7 @@ def shape(
         table,
         write_results,
     )
+    from nrdf_benchmark.shape_picture import draw_surfaces
 
     check_methods(method)
     category, paths = find_shapes(data, split)
@@ -73,4 +75,7 @@ def shape(
         extra = {**origin, "seed": 0, "split": split}
         for path in write_results(results, category, settings, out, extra):
             console.print(f"wrote {path}")
+        picture = out / f"table1-{category}.png"
+        draw_surfaces(paths, specs, settings, picture)
+        console.print(f"wrote {picture}")
     console.print(table(results, category, settings))

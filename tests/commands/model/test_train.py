@@ -29,3 +29,18 @@ def test_prepared_shapes_train_a_field_that_the_other_verbs_take(tmp_path, capsy
     assert f"--model {run}/weights.safetensors" in capsys.readouterr().out
     assert find_weights(run) == run / "weights.safetensors"
     assert load_field(run)[1]["category"] == "chair"
+
+    # The general model learns occupancy of shapes of any category, and nothing else of it changes.
+    config.write_text(
+        "preset: general\n"
+        "data: {encoder_points: 256, queries: 32, correspondences: 0, surface_points: 256}\n"
+        "stages: [{name: all, parts: [local_occupancy], weights: {occupancy: 1}, steps: 2, "
+        "batch_size: 2}]\n"
+    )
+    words = f"model train general --start general {words}"
+    assert cli.run(f"{words} {tmp_path}/general".split()) == 0
+    (before, _), (after, metadata) = load_field("general"), load_field(tmp_path / "general")
+    assert metadata["category"] == "" and metadata["start"]["file"] == "general.safetensors"
+    known = before.state_dict()
+    changed = {n.split(".")[0] for n, v in after.state_dict().items() if not v.equal(known[n])}
+    assert changed == {"local_occupancy"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from PIL import Image
 
 from builders.tiny_field import balls, write_folder
 from nrdf import cli
@@ -23,6 +24,7 @@ def test_the_command_prints_the_table_or_says_what_is_missing(data, untrained, t
     assert shape("--split", "val", "--model", untrained, "--out", tmp_path / "out") == 0
     assert "| `nrdf` |" in capsys.readouterr().out
     assert (tmp_path / "out/table1-chair.json").is_file()
+    assert Image.open(tmp_path / "out/table1-chair.png").width > 200
     assert shape("--model", untrained) == 2
     assert (
         "has no shapes of the split 'test'; prepare some (nrdf model prepare"

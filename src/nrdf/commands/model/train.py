@@ -15,6 +15,7 @@ def train(
     data: tuple[Folder, ...],
     preset: str = "default",
     config: File | None = None,
+    start: str | None = None,
     device: str = "auto",
     out: Folder | None = None,
     overwrite: bool = False,
@@ -28,11 +29,14 @@ def train(
     Example: nrdf model train chair --data data/chair --preset default --device auto
 
     Args:
-        category: What the shapes are; all of them must be of it.
+        category: What the shapes are; all of them must be of it, but for `general`: the model that
+            serves every category, whose occupancy (--preset occupancy) any shapes teach.
         data: Data folders (of `nrdf model prepare`, `synth` or `boxes`).
-        preset: default, chair, paper, ndf, imdc, or one of the last three with -short:
+        preset: default, chair, occupancy, paper, ndf, imdc, or one of the last three with -short:
             the configuration of that name, whose file says what it costs.
         config: A configuration file of your own, instead of a preset.
+        start: Zoo name, weight file or run whose weights training begins with; it must be of the
+            configuration's preset and sizes. Fresh ones unless given.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
         out: The run's folder; runs/CATEGORY unless given.
         overwrite: Start anew in a folder that holds another run.
@@ -42,5 +46,13 @@ def train(
 
     out = out or Path("runs") / category
     settings = load_config(config if config is not None else preset)
-    weights = run(settings, list(data), out, category=category, device=device, overwrite=overwrite)
+    weights = run(
+        settings,
+        list(data),
+        out,
+        category=category,
+        device=device,
+        overwrite=overwrite,
+        start=start,
+    )
     console.print(f"wrote {weights}; use it with --model {weights}")
