@@ -32,6 +32,13 @@ def test_public_names_are_there_and_importing_them_is_cheap():
     code = "import sys, nrdf; print({'torch', 'numpy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+    # Retrieval in the same frame starts without what only scans and meshes need.
+    code = (
+        "import sys, nrdf.regions.reference as _; "
+        "print({'trimesh', 'igl', 'scipy.interpolate', 'nrdf.shapes.families'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
 
 
 def test_every_dependency_is_pinned():

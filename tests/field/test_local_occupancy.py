@@ -6,6 +6,8 @@ import pytest
 import torch
 from torch.nn import functional
 
+from nrdf.errors import ConfigError
+from nrdf.field import build_field
 from nrdf.field.local_occupancy import LocalOccupancy
 
 
@@ -71,3 +73,8 @@ def test_the_order_of_points_does_not_matter_and_few_are_enough(trained):
     one = trained(places, points, normals)
     torch.testing.assert_close(one, trained(places, points[:, order], normals[:, order]))
     assert trained(places, points[:, :5], normals[:, :5]).isfinite().all()
+
+
+def test_a_width_that_attention_cannot_share_is_refused():
+    with pytest.raises(ConfigError, match="'occupancy_width': Input should be a multiple of 8"):
+        build_field("default", {"occupancy_width": 12})

@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from nrdf.field.base import Field, FieldConfig, Inverse
-from nrdf.field.local_occupancy import LocalOccupancy
+from nrdf.field.local_occupancy import LocalOccupancy, Width
 
 _PLANE_AXES = ((0, 1), (1, 2), (2, 0))
 _PLANE_SIDE = 1.1  # canonical side that a plane covers: the unit box and a margin
@@ -46,8 +46,8 @@ class DefaultConfig(FieldConfig):
     """Octaves of the positional encoding."""
     decoder_width: int = 128
     decoder_blocks: int = 2
-    occupancy_width: int = 64
-    """Width of what tells occupancy by the points nearby; divisible by 8."""
+    occupancy_width: Width = 64
+    """Width of what tells occupancy by the points nearby."""
     inverse_width: int = 192
     inverse_blocks: int = 2
     refine_blocks: int = 2

@@ -26,7 +26,7 @@ from torch import Tensor, nn
 
 from nrdf.errors import ModelError
 from nrdf.field.base import Field, FieldConfig, Inverse
-from nrdf.field.local_occupancy import LocalOccupancy
+from nrdf.field.local_occupancy import LocalOccupancy, Width
 from nrdf.field.pair_inverse import PairInverse, Places, Tokens, half_way
 from nrdf.field.tokens import GEOMETRY, farthest_points, gather, squared_distances, surroundings
 
@@ -48,8 +48,8 @@ class GeneralConfig(FieldConfig):
     heads: int = 4
     looks: int = 5
     """Blocks of self- and cross-attention."""
-    occupancy_width: int = 64
-    """Width of what tells occupancy; divisible by 8."""
+    occupancy_width: Width = 64
+    """Width of what tells occupancy."""
 
 
 class GeneralField(Field):

@@ -8,7 +8,10 @@ attention weighs what each of them says.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import torch
+from pydantic import Field
 from torch import Tensor, nn
 
 from nrdf.field.tokens import gather, squared_distances
@@ -18,6 +21,9 @@ _SPACING = 4  # nearest points whose mean distance is the length that counts as 
 _SHORTEST = 1e-3  # canonical; that length is at least this
 _FEATURES = 10
 _HEADS = 8
+
+Width = Annotated[int, Field(ge=_HEADS, multiple_of=_HEADS)]
+"""Size of a field's configuration: features of each near point."""
 
 
 class LocalOccupancy(nn.Module):

@@ -11,7 +11,6 @@ import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from trimesh import bounds
 
 from nrdf.field.cloud_encoder import MINIMUM_POINTS
 from nrdf.geometry.canonical import MIRROR, canonical_transform, rotation_about_up
@@ -165,6 +164,8 @@ def align_scan(scorer: PoseScorer, scan: PointCloud, up: np.ndarray | None = Non
 def _likely_ups(points: np.ndarray) -> list[np.ndarray]:
     """Directions (3,) in which points (n, 3) may have their upper side: the six axes, and, where
     the smallest box around them stands askew, the six directions of its sides."""
+    from trimesh import bounds  # slow to import, and what stands upright never comes here
+
     ups = [up_axis(name) for name in AXES]
     sides = bounds.oriented_bounds(points)[0][:3, :3]
     askew = [side for side in (*sides, *-sides) if np.abs(side).max() < np.cos(_ASKEW)]

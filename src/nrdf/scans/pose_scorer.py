@@ -26,7 +26,6 @@ from nrdf.field.encoded_cloud import (
 from nrdf.geometry.canonical import canonical_transform, rotation_about_up
 from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
-from nrdf.shapes.families import FAMILY_NAMES, get_family
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate
 
 # On pairs of labelled furniture: no wrong pose but of a round stool goes unreported, and one in
@@ -190,6 +189,8 @@ class PoseScorer:
 
 def family_prototypes(category: str) -> list[PointCloud]:
     """Members of a category's family that no training set holds. Raises ModelError without one."""
+    from nrdf.shapes.families import FAMILY_NAMES, get_family  # slow to import, seldom needed
+
     if category not in FAMILY_NAMES:
         raise ModelError(
             f"the category '{category}' has no parametric family (there are "
