@@ -139,3 +139,12 @@ def test_a_prepared_descriptor_serves_several_targets(field):
             found = field.invert_prepared(target, prepared).points
             assert torch.allclose(found, expected, atol=1e-4)
             assert torch.equal(found, field.invert(target, k).points)
+
+
+def test_places_do_not_drown_beside_the_embedding_when_training_begins():
+    field = build_field("paper").eval()
+    points = torch.rand(4, 200, 3, generator=torch.Generator().manual_seed(0)) - 0.5
+    with torch.no_grad():
+        first = field.decoder(field.embed(points, points), points)[1][..., :256]
+    assert first.std(dim=1).mean() > 0.2 * first.mean(dim=1).abs().mean()
+    assert first.std(dim=1).mean() > 0.2  # 0.02 as torch starts the layer
