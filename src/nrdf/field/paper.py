@@ -23,7 +23,6 @@ from nrdf.field.point_nets import (
     working_precision,
 )
 
-
 _POINT_GAIN = 20.0
 """How much larger the weights of point features beside z start in B than torch starts them. As it
 does, 32 values of 0.2 drown in 384 of z, and B learns one mean shape for thousands of steps."""
