@@ -25,7 +25,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from nrdf.field.base import Field, FieldConfig, Inverse
-from nrdf.field.local_occupancy import LocalOccupancy, Width
+from nrdf.field.local_occupancy import LocalOccupancy, Width, points_behind, with_points
 
 _PLANE_AXES = ((0, 1), (1, 2), (2, 0))
 _PLANE_SIDE = 1.1  # canonical side that a plane covers: the unit box and a margin
@@ -69,12 +69,10 @@ class DefaultField(Field):
         self.local_occupancy = LocalOccupancy(self.config.occupancy_width)
 
     def embed(self, points: Tensor, normals: Tensor) -> Tensor:
-        z = self.encoder(points, normals)
-        return torch.cat([z, points.flatten(1), normals.flatten(1)], dim=1)
+        return with_points(self.encoder(points, normals), points, normals)
 
     def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
-        points, normals = z[:, self._coded :].unflatten(1, (2, -1, 3)).unbind(1)
-        return self.local_occupancy(queries, points, normals)
+        return self.local_occupancy(queries, *points_behind(z, self._coded))
 
     def coarse_occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
         latent, _, planes = self._split(z)

@@ -26,7 +26,7 @@ from torch import Tensor, nn
 
 from nrdf.errors import ModelError
 from nrdf.field.base import Field, FieldConfig, Inverse
-from nrdf.field.local_occupancy import LocalOccupancy, Width
+from nrdf.field.local_occupancy import LocalOccupancy, Width, points_behind, with_points
 from nrdf.field.pair_inverse import PairInverse, Places, Tokens, half_way
 from nrdf.field.tokens import GEOMETRY, farthest_points, gather, squared_distances, surroundings
 
@@ -72,13 +72,11 @@ class GeneralField(Field):
         order = torch.randperm(points.shape[1], generator=torch.Generator().manual_seed(0))
         points, normals = points[:, order.to(points.device)], normals[:, order.to(points.device)]
         chosen = farthest_points(points, self.config.tokens)
-        z = pack(self.encoder(points, normals, chosen))
-        return torch.cat([z, points.flatten(1), normals.flatten(1)], dim=1)
+        return with_points(pack(self.encoder(points, normals, chosen)), points, normals)
 
     def occupancy(self, z: Tensor, queries: Tensor) -> Tensor:
-        seen = z[:, sum(_sizes(self.config.tokens)) :]
-        points, normals = seen.unflatten(1, (2, -1, 3)).unbind(1)
-        return self.local_occupancy(queries, points, normals)
+        coded = sum(_sizes(self.config.tokens))
+        return self.local_occupancy(queries, *points_behind(z, coded))
 
     def describe(self, z: Tensor, points: Tensor, normals: Tensor) -> NoReturn:
         """Raises ModelError: descriptors belong to a pair (`transfer`)."""

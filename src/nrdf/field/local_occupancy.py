@@ -52,6 +52,17 @@ class LocalOccupancy(nn.Module):
         return self.leave(x)[..., 0]
 
 
+def with_points(z: Tensor, points: Tensor, normals: Tensor) -> Tensor:
+    """Codes z (b, d), and behind them the points and normals (b, n, 3) that they were made of."""
+    return torch.cat([z, points.flatten(1), normals.flatten(1)], dim=1)
+
+
+def points_behind(z: Tensor, coded: int) -> tuple[Tensor, Tensor]:
+    """The points and normals (b, n, 3) behind the first `coded` values of `with_points`."""
+    points, normals = z[:, coded:].unflatten(1, (2, -1, 3)).unbind(1)
+    return points, normals
+
+
 def _seen_from(places: Tensor, points: Tensor, normals: Tensor) -> Tensor:
     """(b, q, k, `_FEATURES`): of each near point the offset to the place and its length, in units
     of the points' spacing there; its normal; how far the place lies in front of it, in that unit

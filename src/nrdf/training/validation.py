@@ -45,7 +45,7 @@ def validate(field: Field, dataset: ShapeDataset) -> dict[str, float]:
             scores[f"val/error {pattern}"] = found["error"] / found["weight"]
     if every["either"] > 0:
         scores["val/iou"] = every["inside"] / every["either"]
-        if type(field).coarse_occupancy is not Field.coarse_occupancy:
+        if _tells_coarsely(field):
             scores["val/iou coarse"] = every["inside coarse"] / max(every["either coarse"], 1.0)
         scores["val/iou other"] = every["inside other"] / max(every["either other"], 1.0)
     return scores
@@ -67,15 +67,18 @@ def _sums(field: Field, pool: ShapeDataset) -> dict[str, float]:
             sums["copy"] += float((copied.norm(dim=-1) * batch.weight).sum())
             sums["weight"] += float(batch.weight.sum())
         truth = batch.occupancy > 0.5
-        for of, told, embedding in (
-            ("", field.occupancy, z),
-            (" coarse", field.coarse_occupancy, z),
-            (" other", field.coarse_occupancy, z.roll(1, 0)),
-        ):
+        tellings = [("", field.occupancy, z), (" other", field.coarse_occupancy, z.roll(1, 0))]
+        if _tells_coarsely(field):
+            tellings.append((" coarse", field.coarse_occupancy, z))
+        for of, told, embedding in tellings:
             guess = told(embedding, batch.queries) > 0
             sums[f"inside{of}"] += float((guess & truth).sum())
             sums[f"either{of}"] += float((guess | truth).sum())
     return sums
+
+
+def _tells_coarsely(field: Field) -> bool:
+    return type(field).coarse_occupancy is not Field.coarse_occupancy
 
 
 def ignores_embedding(scores: dict[str, float]) -> bool:
