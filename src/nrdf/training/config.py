@@ -111,6 +111,15 @@ class OptimizerConfig(StrictModel):
     weight_decay: float = Field(default=0.0, ge=0)
     clip: float | None = Field(default=None, gt=0)
     """Bound on the gradient's norm."""
+    muon: list[str] = Field(default=[])
+    """Parts of the field whose weight matrices are stepped by Muon (`nrdf.training.muon`); what is
+    left is stepped by adam, without decay."""
+
+    @model_validator(mode="after")
+    def _rest_by_adam(self) -> OptimizerConfig:
+        if self.muon and (self.name != "adam" or self.weight_decay):
+            raise ValueError("muon goes with name: adam and weight_decay: 0")
+        return self
 
 
 class TrainConfig(StrictModel):

@@ -42,6 +42,7 @@ from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
 from nrdf.training.dataset import ShapeDataset, load_dataset
 from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.losses import LOSSES, LossContext
+from nrdf.training.muon import Muon, is_matrix
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import ignores_embedding, validate
@@ -178,7 +179,7 @@ def run_stages(
                 position, checkpoint = Position(number, 0, position.total), None
             pooled = dataset.with_pools(stage.pools)
             parameters = select_parts(field, stage)
-            optimizer = make_optimizer(parameters, stage, config.optimizer)
+            optimizer = make_optimizer(field, stage, config.optimizer)
             if checkpoint is not None:
                 load_optimizer_state(checkpoint, optimizer)
             objective: nn.Module = Objective(field, stage, config, precision)
@@ -291,7 +292,7 @@ def learning_rate(stage: Stage, step: int, length: int) -> float:
 
 
 def check_parts(config: TrainConfig, field: Field) -> None:
-    """ConfigError for a field without weights, or a stage that trains a part which it lacks."""
+    """ConfigError for a field without weights, or where a part is named which it lacks."""
     if not any(True for _ in field.parameters()):
         raise ConfigError(f"the preset '{config.preset}' has no weights: nothing to train")
     for stage in config.stages:
@@ -300,6 +301,9 @@ def check_parts(config: TrainConfig, field: Field) -> None:
                 raise ConfigError(
                     f"stage '{stage.name}': {unknown_name('part', name, list(field.parts()))}"
                 )
+    for name in config.optimizer.muon:
+        if name not in field.parts():
+            raise ConfigError(f"optimizer.muon: {unknown_name('part', name, list(field.parts()))}")
 
 
 def select_parts(field: Field, stage: Stage) -> list[nn.Parameter]:
@@ -311,10 +315,22 @@ def select_parts(field: Field, stage: Stage) -> list[nn.Parameter]:
     return [parameter for parameter in field.parameters() if parameter.requires_grad]
 
 
-def make_optimizer(
-    parameters: list[nn.Parameter], stage: Stage, config: OptimizerConfig
-) -> torch.optim.Optimizer:
-    """A fresh optimizer, as every stage starts with."""
+def make_optimizer(field: Field, stage: Stage, config: OptimizerConfig) -> torch.optim.Optimizer:
+    """A fresh optimizer of what the stage trains, as every stage starts with."""
+    parameters = [parameter for parameter in field.parameters() if parameter.requires_grad]
+    if config.muon:
+        matrices = {
+            parameter
+            for name in config.muon
+            for parameter in field.parts()[name].parameters()
+            if is_matrix(parameter)
+        }
+        return Muon(
+            [parameter for parameter in parameters if parameter in matrices],
+            [parameter for parameter in parameters if parameter not in matrices],
+            stage.rate,
+            config.betas,
+        )
     kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
     return kind(parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay)
 

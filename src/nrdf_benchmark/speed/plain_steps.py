@@ -57,8 +57,8 @@ def compare_steps(preset: str, threads: int, steps: int) -> list[StepComparison]
     plain = PlainPaper(field, config.data.cloud_points)
     found = []
     for number, stage in enumerate(config.stages):
-        parameters = select_parts(field, stage)
-        optimizer = make_optimizer(parameters, stage, config.optimizer)
+        select_parts(field, stage)
+        optimizer = make_optimizer(field, stage, config.optimizer)
         ours = Objective(field, stage, config, torch.bfloat16)
         least = []
         for is_plain in (False, True):

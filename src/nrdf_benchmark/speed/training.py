@@ -50,8 +50,8 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
     field = build_field(config.preset, config.field).to(chosen)
     speeds = []
     for number, stage in enumerate(config.stages):
-        parameters = select_parts(field, stage)
-        optimizer = make_optimizer(parameters, stage, config.optimizer)
+        select_parts(field, stage)
+        optimizer = make_optimizer(field, stage, config.optimizer)
         objective = Objective(field, stage, config, precision)
         clock = Stopwatch(device)
         seconds, points = [], 0
