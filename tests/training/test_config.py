@@ -36,6 +36,7 @@ def test_shipped_configurations_are_valid(path):
         ({"data": {"query": 3}}, "unknown key 'data.query'; did you mean 'queries'?"),
         ({"data": {"augment": {"wrap": 1}}}, "did you mean 'warp'?"),
         ({"optimizer": {"cilp": 1}}, "did you mean 'clip'?"),
+        ({"optimizer": {"name": "adamw", "muon": ["encoder"]}}, "muon goes with name: adam"),
         ({"stages": [{**STAGE, "batchsize": 3}]}, "did you mean 'batch_size'?"),
         ({"stages": [{**STAGE, "weights": {"ocupancy": 1}}]}, "did you mean 'occupancy'?"),
         ({"stages": [{**STAGE, "epochs": 3}]}, "give either epochs or steps"),

@@ -92,9 +92,10 @@ def test_a_run_depends_on_its_seed_alone(data, tmp_path):
     assert not same(first, run(data, tmp_path / "c", tiny_config(seed=1)))
 
 
-@pytest.mark.parametrize("step", [1, 4, 6, 9])
-def test_an_interrupted_run_ends_at_the_same_weights(data, tmp_path, monkeypatch, step):
-    whole = run(data, tmp_path / "whole")
+@pytest.mark.parametrize(("step", "muon"), [(1, []), (4, []), (6, []), (9, []), (6, ["encoder"])])
+def test_an_interrupted_run_ends_at_the_same_weights(data, tmp_path, monkeypatch, step, muon):
+    config = tiny_config(optimizer={"muon": muon})
+    whole = run(data, tmp_path / "whole", config)
     batch, calls = loop.ShapeDataset.batch, []
 
     def interrupt(self, size, seed, *args):
@@ -107,11 +108,11 @@ def test_an_interrupted_run_ends_at_the_same_weights(data, tmp_path, monkeypatch
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("nrdf.training.loop.validate", lambda *_: {})
         patch.setattr(loop.ShapeDataset, "batch", interrupt)
-        run(data, tmp_path / "cut")
+        run(data, tmp_path / "cut", config)
     assert not (tmp_path / "cut" / "weights.safetensors").exists()
-    assert same(whole, run(data, tmp_path / "cut"))
+    assert same(whole, run(data, tmp_path / "cut", config))
     # Once more, after the end: nothing left to do, nothing changed.
-    assert same(whole, run(data, tmp_path / "cut"))
+    assert same(whole, run(data, tmp_path / "cut", config))
 
 
 def test_a_killed_program_goes_on_to_the_same_weights(data, tmp_path):
@@ -219,6 +220,8 @@ def test_a_part_that_does_not_exist_is_named(data, tmp_path):
     stage = {"name": "a", "weights": {"occupancy": 1}, "steps": 1, "parts": ["encodr"]}
     with pytest.raises(ConfigError, match="no part 'encodr'; known: encoder, norm"):
         run(data, tmp_path / "run", tiny_config(stages=[stage]))
+    with pytest.raises(ConfigError, match=r"optimizer\.muon: no part 'decodr'; known: encoder"):
+        run(data, tmp_path / "other", tiny_config(optimizer={"muon": ["decodr"]}))
 
 
 def test_another_run_in_the_folder_is_refused(data, tmp_path):

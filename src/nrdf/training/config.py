@@ -112,8 +112,8 @@ class OptimizerConfig(StrictModel):
     clip: float | None = Field(default=None, gt=0)
     """Bound on the gradient's norm."""
     muon: list[str] = Field(default=[])
-    """Parts of the field whose weight matrices are stepped by Muon (`nrdf.training.muon`); what is
-    left is stepped by adam, without decay."""
+    """Parts of the field whose weight matrices are stepped by Muon (`nrdf.training.optimizer`); the
+    rest is stepped by adam, without decay."""
 
     @model_validator(mode="after")
     def _rest_by_adam(self) -> OptimizerConfig:

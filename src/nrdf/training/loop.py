@@ -38,11 +38,11 @@ from nrdf.training.checkpoint import (
     save_checkpoint,
     write_identity,
 )
-from nrdf.training.config import OptimizerConfig, Stage, TrainConfig
+from nrdf.training.config import Stage, TrainConfig
 from nrdf.training.dataset import ShapeDataset, load_dataset
 from nrdf.training.distributed import Workers, join_workers
 from nrdf.training.losses import LOSSES, LossContext
-from nrdf.training.muon import Muon, is_matrix
+from nrdf.training.optimizer import make_optimizer
 from nrdf.training.progress import Display
 from nrdf.training.provenance import environment, list_shapes, provenance
 from nrdf.training.validation import ignores_embedding, validate
@@ -313,26 +313,6 @@ def select_parts(field: Field, stage: Stage) -> list[nn.Parameter]:
         trains = stage.parts == "all" or name in stage.parts
         part.requires_grad_(trains).train(trains)
     return [parameter for parameter in field.parameters() if parameter.requires_grad]
-
-
-def make_optimizer(field: Field, stage: Stage, config: OptimizerConfig) -> torch.optim.Optimizer:
-    """A fresh optimizer of what the stage trains, as every stage starts with."""
-    parameters = [parameter for parameter in field.parameters() if parameter.requires_grad]
-    if config.muon:
-        matrices = {
-            parameter
-            for name in config.muon
-            for parameter in field.parts()[name].parameters()
-            if is_matrix(parameter)
-        }
-        return Muon(
-            [parameter for parameter in parameters if parameter in matrices],
-            [parameter for parameter in parameters if parameter not in matrices],
-            stage.rate,
-            config.betas,
-        )
-    kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
-    return kind(parameters, stage.rate, betas=config.betas, weight_decay=config.weight_decay)
 
 
 @contextmanager

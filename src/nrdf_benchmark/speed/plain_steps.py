@@ -13,7 +13,8 @@ from nrdf.field.paper import PaperField
 from nrdf.training.batch import seeded
 from nrdf.training.config import load_config
 from nrdf.training.dataset import ShapeDataset
-from nrdf.training.loop import Objective, make_optimizer, select_parts
+from nrdf.training.loop import Objective, select_parts
+from nrdf.training.optimizer import make_optimizer
 from nrdf_benchmark.speed.plain_paper import PlainPaper
 from nrdf_benchmark.speed.training import training_shapes
 

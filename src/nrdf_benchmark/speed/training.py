@@ -38,7 +38,8 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
     from nrdf.training.batch import seeded
     from nrdf.training.config import load_config
     from nrdf.training.dataset import ShapeDataset
-    from nrdf.training.loop import Objective, make_optimizer, select_parts
+    from nrdf.training.loop import Objective, select_parts
+    from nrdf.training.optimizer import make_optimizer
 
     config = load_config(preset)
     chosen = choose_device(device)

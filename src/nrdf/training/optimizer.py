@@ -1,4 +1,4 @@
-"""The optimizer Muon: a step of a weight matrix goes equally far in all its directions."""
+"""Optimizers: Adam, AdamW, and Muon, whose steps of a matrix go equally far in all directions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from nrdf.field.base import Field
 from nrdf.field.device import choose_precision
+from nrdf.training.config import OptimizerConfig, Stage
 
 _LEAST_SIDE = 16
 _MOMENTUM = 0.95
@@ -16,6 +18,21 @@ _ROUNDS = 5
 _COEFFICIENTS = (3.4445, -4.7750, 2.0315)
 _AS_ADAM = 0.2  # root mean square of Adam's steps, in rates
 _EPSILON = 1e-8
+
+
+def make_optimizer(field: Field, stage: Stage, config: OptimizerConfig) -> torch.optim.Optimizer:
+    """A fresh optimizer of the parameters that the stage trains."""
+    parameters = [parameter for parameter in field.parameters() if parameter.requires_grad]
+    if not config.muon:
+        kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
+        return kind(parameters, stage.rate, config.betas, weight_decay=config.weight_decay)
+    matrices, others = [], []
+    for name, part in field.parts().items():
+        for parameter in part.parameters():
+            if parameter.requires_grad:
+                by_muon = name in config.muon and is_matrix(parameter)
+                (matrices if by_muon else others).append(parameter)
+    return Muon(matrices, others, stage.rate, config.betas)
 
 
 class Muon(torch.optim.Optimizer):

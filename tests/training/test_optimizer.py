@@ -1,4 +1,4 @@
-"""The optimizer Muon."""
+"""Optimizers: which parameters they take, and Muon against what it is defined by."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from nrdf.training.muon import Muon, is_matrix, orthogonal
+from nrdf.field.paper import PaperField
+from nrdf.training.config import load_config
+from nrdf.training.loop import select_parts
+from nrdf.training.optimizer import Muon, is_matrix, make_optimizer, orthogonal
 
 
 def test_orthogonal_matrices_have_like_singular_values() -> None:
@@ -69,3 +72,18 @@ def test_layers_from_or_to_coordinates_are_no_matrices(
     shape: tuple[int, ...], expected: bool
 ) -> None:
     assert is_matrix(torch.zeros(shape)) is expected
+
+
+def test_muon_steps_the_matrices_of_the_named_parts() -> None:
+    config = load_config("paper-short")
+    assert config.optimizer.muon == ["encoder", "decoder"]
+    field = PaperField()
+    for stage in config.stages:
+        trained = {id(parameter) for parameter in select_parts(field, stage)}
+        optimizer = make_optimizer(field, stage, config.optimizer)
+        matrices, others = ({id(p) for p in group["params"]} for group in optimizer.param_groups)
+        assert matrices | others == trained and not matrices & others
+        assert id(field.decoder.enter.weight) in matrices
+        assert id(field.encoder.convolution.convolutions[1].weight) in matrices
+        assert id(field.decoder.lift.weight) in others and id(field.decoder.leave.weight) in others
+        assert id(field.inverse.enter.weight) not in matrices
