@@ -221,7 +221,8 @@ def test_a_part_that_does_not_exist_is_named(data, tmp_path):
     with pytest.raises(ConfigError, match="no part 'encodr'; known: encoder, norm"):
         run(data, tmp_path / "run", tiny_config(stages=[stage]))
     with pytest.raises(ConfigError, match=r"optimizer\.muon: no part 'decodr'; known: encoder"):
-        run(data, tmp_path / "other", tiny_config(optimizer={"muon": ["decodr"]}))
+        run(data, tmp_path / "run", tiny_config(optimizer={"muon": ["decodr"]}))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_another_run_in_the_folder_is_refused(data, tmp_path):

@@ -81,6 +81,7 @@ def train(
     something else, or cannot be written) and TrainingError (the loss stayed infinite or NaN).
     """
     out = Path(out)
+    check_parts(config, build_field(config.preset, config.field))
     with join_workers(device) as workers, write_lock(out) if workers.first else nullcontext():
         entries = list_shapes([Path(folder) for folder in data])
         dataset = load_dataset(entries, "train", config.data, workers.device)
@@ -153,7 +154,6 @@ def run_stages(
     if start is not None:
         start_with(field, start)
     start_parts(field, config.start_parts)
-    check_parts(config, field)
     lengths = [
         stage_steps(stage, dataset.with_pools(stage.pools), workers.world)
         for stage in config.stages
