@@ -26,7 +26,8 @@ def make_optimizer(field: Field, stage: Stage, config: OptimizerConfig) -> torch
     if not config.muon:
         kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
         return kind(parameters, stage.rate, config.betas, weight_decay=config.weight_decay)
-    matrices, others = [], []
+    matrices: list[nn.Parameter] = []
+    others: list[nn.Parameter] = []
     for name, part in field.parts().items():
         for parameter in part.parameters():
             if parameter.requires_grad:
@@ -58,7 +59,7 @@ class Muon(torch.optim.Optimizer):
         super().__init__(groups, {"lr": rate, "betas": betas})
 
     @torch.no_grad()
-    def step(self, closure: Any = None) -> None:
+    def step(self, closure: Any = None) -> None:  # type: ignore[override]
         """Step every parameter that has a gradient (no `closure` is called)."""
         for group in self.param_groups:
             for parameter in group["params"]:
