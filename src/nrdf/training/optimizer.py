@@ -22,17 +22,14 @@ _EPSILON = 1e-8
 
 def make_optimizer(field: Field, stage: Stage, config: OptimizerConfig) -> torch.optim.Optimizer:
     """A fresh optimizer of the parameters that the stage trains."""
-    parameters = [parameter for parameter in field.parameters() if parameter.requires_grad]
+    trained = {name: p for name, p in field.named_parameters() if p.requires_grad}
     if not config.muon:
         kind = torch.optim.AdamW if config.name == "adamw" else torch.optim.Adam
+        parameters = list(trained.values())
         return kind(parameters, stage.rate, config.betas, weight_decay=config.weight_decay)
-    matrices: list[nn.Parameter] = []
-    others: list[nn.Parameter] = []
-    for name, part in field.parts().items():
-        for parameter in part.parameters():
-            if parameter.requires_grad:
-                by_muon = name in config.muon and is_matrix(parameter)
-                (matrices if by_muon else others).append(parameter)
+    by_muon = {n for n, p in trained.items() if n.split(".")[0] in config.muon and is_matrix(p)}
+    matrices = [p for name, p in trained.items() if name in by_muon]
+    others = [p for name, p in trained.items() if name not in by_muon]
     return Muon(matrices, others, stage.rate, config.betas)
 
 
