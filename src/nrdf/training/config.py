@@ -89,6 +89,8 @@ class Stage(StrictModel):
     schedule: Literal["constant", "cosine"] = "constant"
     warmup: int = Field(default=0, ge=0)
     """Steps over which the rate rises linearly from zero."""
+    seed: int | None = Field(default=None, ge=0)
+    """Of what this stage draws, instead of the run's: what chance does from the same beginning."""
 
     @field_validator("weights")
     @classmethod

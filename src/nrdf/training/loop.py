@@ -178,6 +178,7 @@ def run_stages(
             if position.stage < number:
                 position, checkpoint = Position(number, 0, position.total), None
             pooled = dataset.with_pools(stage.pools)
+            base = config.seed if stage.seed is None else stage.seed
             parameters = select_parts(field, stage)
             optimizer = make_optimizer(field, stage, config.optimizer)
             if checkpoint is not None:
@@ -189,10 +190,10 @@ def run_stages(
             counted, skipped = 0, 0
 
             for step in range(position.step, length):
-                seed = config.seed + 7919 * number
+                seed = base + 7919 * number
                 batch = pooled.batch(stage.batch_size, seed, step, workers.rank, workers.world)
                 # Dropout and the like draw from the global generator.
-                torch.manual_seed(config.seed * 1_000_003 + position.total)
+                torch.manual_seed(base * 1_000_003 + position.total)
                 generator = seeded(workers.device, seed, step, workers.rank, 1)
                 for group in optimizer.param_groups:
                     group["lr"] = learning_rate(stage, step, length)

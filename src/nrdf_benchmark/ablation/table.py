@@ -141,10 +141,11 @@ def validation_losses(field: Field, dataset: ShapeDataset) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class VariantResult:
-    """One row of Table III.
+    """One training of Table III.
 
     regions: name to mean CD-L1; validation: variant to the loss that it omits, on unseen shapes;
-    seconds: of training, without the shared stages; training: what the weight file says of it.
+    seconds: of training, without the shared stages; training: what the weight file says of it;
+    seed: of the last stage.
     """
 
     variant: str
@@ -152,6 +153,7 @@ class VariantResult:
     validation: dict[str, float]
     seconds: float
     training: dict[str, Any]
+    seed: int = 0
 
     @property
     def mean(self) -> float:
@@ -171,23 +173,33 @@ class Ablation:
     results: list[VariantResult]
 
     def table(self) -> str:
-        """Markdown: a row a variant; beside its score the value of every omitted loss on unseen
-        shapes, and the published score where it is known."""
+        """Markdown: a row a variant, the mean and the range over its seeds; beside them the value
+        of every omitted loss on unseen shapes, and the published score where it is known."""
         published = PUBLISHED.get(self.category, {})
         losses = list(self.results[0].validation) if self.results else []
-        columns = [f"{self.category}, {self.schedule} schedule", "**CD-L1**"]
+        rows: dict[str, list[VariantResult]] = {}
+        for result in self.results:
+            rows.setdefault(result.variant, []).append(result)
+        ranges = ["lowest to highest"] * any(len(row) > 1 for row in rows.values())
+        columns = [f"{self.category}, {self.schedule} schedule", "**CD-L1**", *ranges]
         columns += ["published"] * bool(published) + [f"{name.upper()} loss" for name in losses]
         lines = [f"| {' | '.join([*columns, 'training, s'])} |", "|---" * (len(columns) + 1) + "|"]
-        for row in self.results:
-            cells = [describe(row.variant), f"**{row.mean:.4f}**"]
+        for variant, row in rows.items():
+            means = [result.mean for result in row]
+            cells = [describe(variant), f"**{np.mean(means):.4f}**"]
+            if ranges:
+                cells.append(f"{min(means):.4f} to {max(means):.4f}" if len(row) > 1 else "")
             if published:
-                cells.append(f"{published[row.variant]:.3f}" if row.variant in published else "")
-            cells += [f"{row.validation[name]:.4f}" for name in losses]
-            lines.append(f"| {' | '.join([*cells, f'{row.seconds:.0f}'])} |")
+                cells.append(f"{published[variant]:.3f}" if variant in published else "")
+            cells += [f"{np.mean([r.validation[name] for r in row]):.4f}" for name in losses]
+            lines.append(f"| {' | '.join(cells)} | {np.mean([r.seconds for r in row]):.0f} |")
         lines += [
             "",
             f"CD-L1 by eq. 9, on {self.ground}: {METRICS['cd-l1'].formula}. Lower is better.",
         ]
+        if ranges:
+            count = max(len(row) for row in rows.values())
+            lines.append(f"Means of {count} seeds of the last stage, from the same shared stages.")
         if losses:
             lines.append("The losses themselves are of shapes not trained on.")
         lines.append(
@@ -196,15 +208,15 @@ class Ablation:
         return "\n".join(lines)
 
     def csv(self) -> str:
-        """A line a variant: score, regions, losses on unseen shapes, seconds."""
+        """A line a training: variant, seed, score, regions, losses on unseen shapes, seconds."""
         first = self.results[0]
         regions, losses = list(first.regions), list(first.validation)
-        rows: list[list[object]] = [
-            ["variant", "cd_l1", *regions, *(f"validation_{name}" for name in losses), "seconds"]
-        ]
+        names = [*regions, *(f"validation_{name}" for name in losses), "seconds"]
+        rows: list[list[object]] = [["variant", "seed", "cd_l1", *names]]
         for row in self.results:
             values = [row.mean, *map(row.regions.get, regions), *map(row.validation.get, losses)]
-            rows.append([row.variant, *(f"{value:.6f}" for value in values), f"{row.seconds:.1f}"])
+            numbers = (f"{value:.6f}" for value in values)
+            rows.append([row.variant, row.seed, *numbers, f"{row.seconds:.1f}"])
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows(rows)
         return text.getvalue()

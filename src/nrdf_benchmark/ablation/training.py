@@ -1,4 +1,4 @@
-"""Table III's trainings: without each loss of the last stage, and with all of them.
+"""Table III's trainings: without each loss of the last stage, and with all of them, by some seeds.
 
 The stages before the last are the same in every variant, so they are trained once: `shared/` in the
 output folder is a run that every variant begins from (`nrdf.training.loop.train`).
@@ -35,21 +35,24 @@ OMITTED = {
 }
 """Variant to the loss that it is trained without, by the paper's abbreviations."""
 VARIANTS = (COMPLETE, *OMITTED)
-SCHEDULES = {"short": "paper-short", "full": "paper"}
+SCHEDULES = {"short": "ablation-short", "full": "paper"}
 """Schedule to the configuration that it trains."""
 
 
-def variant_config(config: TrainConfig, variant: str) -> TrainConfig:
+def variant_config(config: TrainConfig, variant: str, seed: int = 0) -> TrainConfig:
     """The configuration with one loss fewer in its last stage, or as it is ("complete").
+
+    seed: other than 0, that of the last stage's draws.
 
     Raises ConfigError for an unknown variant, and one whose loss the last stage does not have.
     """
     if variant not in VARIANTS:
         raise ConfigError(unknown_name("variant", variant, VARIANTS))
-    if variant == COMPLETE:
-        return config
-    stage, loss = config.stages[-1], OMITTED[variant]
-    if loss not in stage.weights:
+    stage = config.stages[-1]
+    if seed:
+        stage = stage.model_copy(update={"seed": seed})
+    loss = OMITTED.get(variant)
+    if loss is not None and loss not in stage.weights:
         raise ConfigError(
             f"variant '{variant}' leaves out '{loss}', which the last stage '{stage.name}' does "
             f"not have: {', '.join(stage.weights)}"
@@ -75,19 +78,26 @@ def train_variants(
     category: str,
     device: str = "auto",
     overwrite: bool = False,
-) -> dict[str, Path]:
-    """Train what of the variants is not trained yet, each in a folder of `out`; their folders.
+    seeds: int = 1,
+) -> dict[tuple[str, int], Path]:
+    """Train what of the variants is not trained yet, each in a folder of `out`; the folders by
+    variant and seed.
 
-    Started again after whatever ended it, it goes on. Other processes may train other variants in
-    the same `out` meanwhile; one that wants the same run waits until it is done. Errors are those
-    of `variant_config` and `nrdf.training.loop.train`.
+    The stages before the last are trained once, whatever the seed of the last. Started again after
+    whatever ended it, it goes on. Other processes may train other variants in the same `out`
+    meanwhile; one that wants the same run waits until it is done. Errors are those of
+    `variant_config` and `nrdf.training.loop.train`.
     """
     if int(os.environ.get("WORLD_SIZE", "1")) > 1:
         raise ConfigError(
             "an ablation does not run under torchrun; start one command for each device, each "
             "with some of the variants"
         )
-    settings = {name: variant_config(config, name) for name in variants}
+    settings = {
+        (name, seed): variant_config(config, name, seed)
+        for seed in range(seeds)
+        for name in variants
+    }
     shapes = [entry.path.stem for entry in list_shapes(data) if entry.split == "train"]
 
     def run(name: str, wanted: TrainConfig, begin: Path | None, what: str) -> None:
@@ -102,13 +112,18 @@ def train_variants(
                 train(wanted, data, folder, category=category, device=device, begin=begin)
 
     run(SHARED, shared_config(config), None, "stages that all variants share")
-    for number, (name, wanted) in enumerate(settings.items(), 1):
-        run(name, wanted, out / SHARED, f"{describe(name)} ({number} of {len(settings)})")
-    return {name: out / name for name in variants}
+    folders = {}
+    for number, ((name, seed), wanted) in enumerate(settings.items(), 1):
+        folder = f"{name}-seed-{seed}" if seed else name
+        run(folder, wanted, out / SHARED, f"{describe(name)} ({number} of {len(settings)})")
+        folders[name, seed] = out / folder
+    return folders
 
 
 def describe(variant: str) -> str:
-    """A variant in words: "all losses" or "without CD"."""
+    """A variant in words: "all losses", "without CD" or "without the last stage"."""
+    if variant == SHARED:
+        return "without the last stage"
     return "all losses" if variant == COMPLETE else f"without {variant.upper()}"
 
 

@@ -24,6 +24,7 @@ def ablate(
     bsrc: Folder | None = None,
     labels: Literal["published", "corrected"] = "published",
     pairs: Count = 20,
+    seeds: Count = 1,
     device: str = "auto",
     workers: Count | None = None,
     cluster: Cluster | None = None,
@@ -32,16 +33,16 @@ def ablate(
 ) -> None:
     """Train without each loss of the last stage, and score (Table III).
 
-    One training for each loss left out, and one with all of them: same seed, same budget, and the
-    stages before the last trained once for all. Killed at any moment, the same command goes on;
-    what is trained is not trained again. Two commands with the same folder share the work, one with
-    --only complete cd emd, the other with --only ncd ds dd; a last one without --only prints the
-    whole table.
+    One training for each loss left out, and one with all of them: same seeds, same budget, and the
+    stages before the last trained once for all. What these alone are worth is a row as well. Killed
+    at any moment, the same command goes on; what is trained is not trained again. Two commands with
+    the same folder share the work, one with --only complete cd emd, the other with --only ncd ds
+    dd; a last one without --only prints the whole table.
 
     The score is the mean CD-L1 of the paper's convention, by the paper's eq. 9: on BSRC where its
     folder is given, else on the named regions of parametric shapes that no training set holds.
 
-    Example: nrdf ablate chair --data data/chair data/chair-family --schedule short --bsrc bsrc/
+    Example: nrdf ablate chair --data data/chair data/chair-family --seeds 3 --bsrc bsrc/
 
     Args:
         category: What the shapes are; chair, car or plane with --bsrc.
@@ -56,6 +57,8 @@ def ablate(
         bsrc: BSRC's folder, with Chair, Car and plane in it.
         labels: BSRC's, as published, or corrected.
         pairs: Pairs of parametric shapes, without --bsrc.
+        seeds: Times that each variant's last stage is trained, with different draws; the table
+            has their mean and range, which tells whether two variants differ.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
         workers: Processes that score on BSRC; all cores unless given.
         cluster: Address of a Dask scheduler whose workers do so instead.
@@ -84,13 +87,21 @@ def ablate(
         ground = f"the named regions of {pairs} pairs of parametric shapes, none of them trained on"
 
     runs = ablation.train_variants(
-        only, settings, data, out, category=category, device=device, overwrite=overwrite
+        only,
+        settings,
+        data,
+        out,
+        category=category,
+        device=device,
+        overwrite=overwrite,
+        seeds=seeds,
     )
     entries = list_shapes(data)
     unseen = any(entry.split == "val" for entry in entries)
     dataset = load_dataset(entries, "val", settings.data, chosen) if unseen else None
     results = []
-    for variant, run in runs.items():
+    runs[ablation.SHARED, 0] = out / ablation.SHARED
+    for (variant, seed), run in runs.items():
         model = nrdf.load_model(run, str(chosen))
         with progress_bar(ablation.describe(variant)) as progress:
             if bsrc is None:
@@ -100,9 +111,11 @@ def ablate(
                     benchmark, run, str(chosen), cores, lambda _, *counts: progress(*counts)
                 )
         validation = ablation_table.validation_losses(model.field, dataset) if dataset else {}
-        seconds = ablation.read_cost(run)
+        seconds = 0.0 if variant == ablation.SHARED else ablation.read_cost(run)
         results.append(
-            ablation_table.VariantResult(variant, regions, validation, seconds, model.metadata)
+            ablation_table.VariantResult(
+                variant, regions, validation, seconds, model.metadata, seed
+            )
         )
     found = ablation_table.Ablation(
         category,

@@ -26,7 +26,7 @@ from nrdf_benchmark.ablation.table import (
     score,
     validation_losses,
 )
-from nrdf_benchmark.ablation.training import OMITTED
+from nrdf_benchmark.ablation.training import OMITTED, SHARED
 from nrdf_benchmark.bsrc.dataset import read_bsrc
 from nrdf_benchmark.methods.learned import FieldMethod
 from nrdf_benchmark.metrics import MISSED
@@ -133,6 +133,31 @@ def test_the_table_says_what_it_was_measured_on(tmp_path):
     assert content["seed"] == 7 and content["variants"][1]["mean"] == pytest.approx(0.05)
     assert content["convention"].startswith("Manhattan")
     assert content["published"] == ablation_table.PUBLISHED["chair"]
+
+
+def test_seeds_are_shown_as_their_mean_and_range(tmp_path):
+    results = [
+        result("complete", 0.04),
+        result("complete", 0.05, seed=1, seconds=30.0),
+        result(SHARED, 0.06, seconds=0.0),
+    ]
+    found = Ablation("chair", "short", "20 pairs", 90.0, results)
+    lines = found.table().splitlines()
+    assert lines[0].startswith(
+        "| chair, short schedule | **CD-L1** | lowest to highest | published"
+    )
+    assert lines[2].startswith("| all losses | **0.0450** | 0.0400 to 0.0500 | 0.039 | 0.5000 |")
+    assert lines[2].endswith("| 45 |")
+    assert lines[3].startswith("| without the last stage | **0.0600** |  |  | 0.5000 |")
+    assert len({line.count("|") for line in lines[:4]}) == 1
+    assert "Means of 2 seeds of the last stage" in found.table()
+    found.write(tmp_path, {})
+    rows = list(csv.DictReader((tmp_path / "table3.csv").open()))
+    assert [(row["variant"], row["seed"]) for row in rows] == [
+        ("complete", "0"),
+        ("complete", "1"),
+        (SHARED, "0"),
+    ]
 
 
 def test_a_category_that_the_paper_lacks_has_no_published_column():

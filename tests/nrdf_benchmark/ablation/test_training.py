@@ -51,7 +51,7 @@ def same(a, b) -> bool:
 
 
 def test_a_variant_lacks_one_loss_of_the_last_stage_and_nothing_else():
-    paper = load_config("paper-short")
+    paper = load_config("ablation-short")
     assert variant_config(paper, COMPLETE) == paper
     for variant, loss in OMITTED.items():
         changed = variant_config(paper, variant)
@@ -60,6 +60,7 @@ def test_a_variant_lacks_one_loss_of_the_last_stage_and_nothing_else():
         assert loss not in changed.stages[-1].weights
         assert changed.model_copy(update={"stages": [*changed.stages[:-1], last]}) == paper
     assert shared_config(paper).stages == paper.stages[:-1]
+    assert shared_config(paper) == shared_config(load_config("paper-short"))
 
 
 def test_variants_that_cannot_be_are_refused():
@@ -74,20 +75,39 @@ def test_variants_that_cannot_be_are_refused():
 
 def test_every_variant_ends_as_if_trained_from_scratch(data, tmp_path):
     runs = run(data, tmp_path / "out", ("complete", "emd"))
-    assert list(runs) == ["complete", "emd"]
+    assert list(runs) == [("complete", 0), ("emd", 0)]
     assert sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir()) == sorted(
         ["complete", "emd", SHARED]
     )
-    for variant, folder in runs.items():
+    for (variant, _), folder in runs.items():
         config = variant_config(CONFIG, variant)
         train(config, [data], tmp_path / variant, category="chair", device="cpu")
         assert same(tmp_path / variant, folder)
         assert read_cost(folder) > 0
-    assert not same(runs["complete"], runs["emd"])
+    assert not same(runs["complete", 0], runs["emd", 0])
+
+
+def test_seeds_differ_in_the_last_stage_alone(data, tmp_path, monkeypatch):
+    trained, steps = loop.train, []
+    monkeypatch.setattr(
+        ablation, "train", lambda *a, **k: steps.append(a[2].name) or trained(*a, **k)
+    )
+    runs = run(data, tmp_path / "out", ("complete",), seeds=2)
+    assert {key: folder.name for key, folder in runs.items()} == {
+        ("complete", 0): "complete",
+        ("complete", 1): "complete-seed-1",
+    }
+    assert steps == [SHARED, "complete", "complete-seed-1"]
+    assert not same(*runs.values())
+    config = variant_config(CONFIG, COMPLETE, 1)
+    assert config.stages[:-1] == CONFIG.stages[:-1] and config.stages[-1].seed == 1
+    assert config.seed == CONFIG.seed
+    train(config, [data], tmp_path / "scratch", category="chair", device="cpu")
+    assert same(tmp_path / "scratch", runs["complete", 1])
 
 
 def test_what_is_trained_is_not_trained_again_and_what_is_not_goes_on(data, tmp_path, monkeypatch):
-    whole = run(data, tmp_path / "whole", ("cd",))["cd"]
+    whole = run(data, tmp_path / "whole", ("cd",))["cd", 0]
     rate, steps = loop.learning_rate, []
 
     def counted(*args):
@@ -101,7 +121,7 @@ def test_what_is_trained_is_not_trained_again_and_what_is_not_goes_on(data, tmp_
         run(data, tmp_path / "cut", ("cd",))
     spent = read_cost(tmp_path / "cut/cd")
     assert spent > 0
-    cut = run(data, tmp_path / "cut", ("cd",))["cd"]
+    cut = run(data, tmp_path / "cut", ("cd",))["cd", 0]
     assert same(whole, cut) and len(steps) == 8 + 3  # the checkpoint is of step 6 of 9
     assert read_cost(cut) > spent
     run(data, tmp_path / "cut", ("cd",))

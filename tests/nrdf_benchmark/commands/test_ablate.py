@@ -55,8 +55,11 @@ def test_the_command_trains_scores_and_prints_on_either_ground(data, tmp_path, c
     assert ablate("--only", "complete", "cd", "--bsrc", bsrc) == 0
     shown = capsys.readouterr().out
     assert "2 ordered pairs, labels as published" in shown and "| without CD |" in shown
-    assert ablate("--only", "cd", "--pairs", "1") == 0
+    assert "| without the last stage |" in shown
+    assert ablate("--only", "cd", "--pairs", "1", "--seeds", "2") == 0
     assert "named regions of 1 pairs" in capsys.readouterr().out
     content = json.loads((out / "table3.json").read_text())
     assert content["schedule"] == "tiny" and content["versions"]["torch"]
     assert content["variants"][0]["training"]["category"] == "chair"
+    named = [(row["variant"], row["seed"]) for row in content["variants"]]
+    assert named == [("cd", 0), ("cd", 1), ("shared", 0)]
