@@ -115,6 +115,21 @@ def test_an_interrupted_run_ends_at_the_same_weights(data, tmp_path, monkeypatch
     assert same(whole, run(data, tmp_path / "cut", config))
 
 
+def test_a_run_starts_with_a_models_weights_but_once(data, tmp_path, monkeypatch):
+    given = run(data, tmp_path / "given", tiny_config(seed=5))
+    whole = run(data, tmp_path / "whole", start=given)
+    assert not same(whole, run(data, tmp_path / "fresh"))
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(loop, "save_weights", interrupted)
+        run(data, tmp_path / "cut", start=given)
+    monkeypatch.setattr(loop, "start_with", interrupted)
+    assert same(whole, run(data, tmp_path / "cut", start=given))
+
+
 def test_a_killed_program_goes_on_to_the_same_weights(data, tmp_path):
     stage = {"name": "a", "weights": {"occupancy": 1}, "steps": 60, "batch_size": 4}
     changes = {"checkpoint_every": 3, "validate_every": 1000, "log_every": 1000, "stages": [stage]}

@@ -11,9 +11,11 @@ from nrdf.field.weights import load_weights
 from nrdf.training.weights import averaged, start_parts, start_with, to_device, update_average
 
 
-def test_a_field_starts_with_a_models_weights(untrained):
+def test_a_field_starts_with_a_models_weights(untrained, caplog):
+    caplog.set_level("INFO", "nrdf.training.weights")
     field = build_field("default")
     start_with(field, untrained)
+    assert f"start as those of {untrained}, of chair" in caplog.text
     wanted = load_weights(untrained)[0].state_dict()
     assert all(torch.equal(value, wanted[name]) for name, value in field.state_dict().items())
 

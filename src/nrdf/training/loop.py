@@ -151,9 +151,6 @@ def run_stages(
     run begins with the weights of the model `start`."""
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
-    if start is not None:
-        start_with(field, start)
-    start_parts(field, config.start_parts)
     lengths = [
         stage_steps(stage, dataset.with_pools(stage.pools), workers.world)
         for stage in config.stages
@@ -161,6 +158,10 @@ def run_stages(
     precision = choose_precision(config.precision, workers.device)
 
     checkpoint = latest_checkpoint(out) or begin
+    if checkpoint is None:
+        if start is not None:
+            start_with(field, start)
+        start_parts(field, config.start_parts)
     position = Position() if checkpoint is None else read_position(checkpoint)
     average = None if checkpoint is None else load_field_state(checkpoint, field)
     if config.ema is not None:

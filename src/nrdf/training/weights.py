@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,16 +14,21 @@ from nrdf.errors import ConfigError
 from nrdf.field.base import Field
 from nrdf.field.zoo import load_field
 
+log = logging.getLogger(__name__)
+
 
 def start_with(field: Field, model: str | Path) -> None:
     """Give a field the weights of a model. Raises ConfigError where it is of other sizes."""
-    given = load_field(model)[0]
+    given, metadata = load_field(model)
     if (given.preset, given.config) != (field.preset, field.config):
         raise ConfigError(
             f"the run cannot start with {model}: it is of preset '{given.preset}', or of other "
             f"sizes than the configuration's '{field.preset}'"
         )
     field.load_state_dict(given.state_dict())
+    log.info(
+        "the weights start as those of %s, of %s", model, metadata["category"] or "any category"
+    )
 
 
 def start_parts(field: Field, models: Mapping[str, str]) -> None:
