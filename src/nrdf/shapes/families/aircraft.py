@@ -38,9 +38,6 @@ class Aircraft:
         side = [0, wing_x - style.chord, wing_x, max(back, wing_x + 0.02), front, 1]
         self.parts.insert(0, self.fuselage.part(top, side))
 
-    def fuselage_is(self, kind: str) -> bool:
-        return self.style.fuselage == kind
-
     def _wing(self) -> None:
         st, rng = self.style, self.rng
         semi = st.span / 2
