@@ -60,7 +60,8 @@ def test_a_variant_lacks_one_loss_of_the_last_stage_and_nothing_else():
         assert loss not in changed.stages[-1].weights
         assert changed.model_copy(update={"stages": [*changed.stages[:-1], last]}) == paper
     assert shared_config(paper).stages == paper.stages[:-1]
-    assert shared_config(paper) == shared_config(load_config("paper-short"))
+    trained = load_config("paper-short")
+    assert trained.model_copy(update={"stages": trained.stages[:2]}) == shared_config(paper)
 
 
 def test_variants_that_cannot_be_are_refused():
