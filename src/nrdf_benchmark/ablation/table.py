@@ -24,7 +24,7 @@ from nrdf.tasks import Workers
 from nrdf.training.batch import seeded
 from nrdf.training.dataset import ShapeDataset
 from nrdf.training.losses import LOSSES, LossContext
-from nrdf_benchmark.ablation.training import OMITTED, describe
+from nrdf_benchmark.ablation.training import COMPLETE, OMITTED, describe
 from nrdf_benchmark.bsrc.dataset import Benchmark
 from nrdf_benchmark.bsrc.evaluate import evaluate
 from nrdf_benchmark.families import CLOUD_POINTS, FIRST_SEED
@@ -173,14 +173,18 @@ class Ablation:
     results: list[VariantResult]
 
     def table(self) -> str:
-        """Markdown: a row a variant, the mean and the range over its seeds; beside them the value
-        of every omitted loss on unseen shapes, and the published score where it is known."""
+        """Markdown: a row a variant, the mean and the range over its seeds, and the range of what
+        it is above all losses with the same seed; beside them the value of every omitted loss on
+        unseen shapes, and the published score where it is known."""
         published = PUBLISHED.get(self.category, {})
         losses = list(self.results[0].validation) if self.results else []
         rows: dict[str, list[VariantResult]] = {}
         for result in self.results:
             rows.setdefault(result.variant, []).append(result)
-        ranges = ["lowest to highest"] * any(len(row) > 1 for row in rows.values())
+        ranges: list[str] = []
+        if any(len(row) > 1 for row in rows.values()):
+            ranges = ["lowest to highest", "above all losses, by seed"]
+        complete = {result.seed: result.mean for result in rows.get(COMPLETE, [])}
         columns = [f"{self.category}, {self.schedule} schedule", "**CD-L1**", *ranges]
         columns += ["published"] * bool(published) + [f"{name.upper()} loss" for name in losses]
         lines = [f"| {' | '.join([*columns, 'training, s'])} |", "|---" * (len(columns) + 1) + "|"]
@@ -188,7 +192,10 @@ class Ablation:
             means = [result.mean for result in row]
             cells = [describe(variant), f"**{np.mean(means):.4f}**"]
             if ranges:
+                above = [r.mean - complete[r.seed] for r in row if r.seed in complete]
                 cells.append(f"{min(means):.4f} to {max(means):.4f}" if len(row) > 1 else "")
+                shown = len(above) > 1 and variant != COMPLETE
+                cells.append(f"{min(above):+.4f} to {max(above):+.4f}" if shown else "")
             if published:
                 cells.append(f"{published[variant]:.3f}" if variant in published else "")
             cells += [f"{np.mean([r.validation[name] for r in row]):.4f}" for name in losses]

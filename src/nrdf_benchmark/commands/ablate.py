@@ -58,7 +58,7 @@ def ablate(
         labels: BSRC's, as published, or corrected.
         pairs: Pairs of parametric shapes, without --bsrc.
         seeds: Times that each variant's last stage is trained, with different draws; the table
-            has their mean and range, which tells whether two variants differ.
+            has their mean and range, and by how much each is above all losses with the same seed.
         device: auto (CUDA where there is one), cpu, cuda or cuda:N.
         workers: Processes that score on BSRC; all cores unless given.
         cluster: Address of a Dask scheduler whose workers do so instead.

@@ -139,23 +139,26 @@ def test_seeds_are_shown_as_their_mean_and_range(tmp_path):
     results = [
         result("complete", 0.04),
         result("complete", 0.05, seed=1, seconds=30.0),
+        result("emd", 0.045),
+        result("emd", 0.048, seed=1),
         result(SHARED, 0.06, seconds=0.0),
     ]
     found = Ablation("chair", "short", "20 pairs", 90.0, results)
     lines = found.table().splitlines()
-    assert lines[0].startswith(
-        "| chair, short schedule | **CD-L1** | lowest to highest | published"
-    )
-    assert lines[2].startswith("| all losses | **0.0450** | 0.0400 to 0.0500 | 0.039 | 0.5000 |")
+    assert "| **CD-L1** | lowest to highest | above all losses, by seed | published |" in lines[0]
+    assert lines[2].startswith("| all losses | **0.0450** | 0.0400 to 0.0500 |  | 0.039 | 0.5000 |")
     assert lines[2].endswith("| 45 |")
-    assert lines[3].startswith("| without the last stage | **0.0600** |  |  | 0.5000 |")
-    assert len({line.count("|") for line in lines[:4]}) == 1
+    assert "| **0.0465** | 0.0450 to 0.0480 | -0.0020 to +0.0050 | 0.223 |" in lines[3]
+    assert lines[4].startswith("| without the last stage | **0.0600** |  |  |  | 0.5000 |")
+    assert len({line.count("|") for line in lines[:5]}) == 1
     assert "Means of 2 seeds of the last stage" in found.table()
     found.write(tmp_path, {})
     rows = list(csv.DictReader((tmp_path / "table3.csv").open()))
     assert [(row["variant"], row["seed"]) for row in rows] == [
         ("complete", "0"),
         ("complete", "1"),
+        ("emd", "0"),
+        ("emd", "1"),
         (SHARED, "0"),
     ]
 
