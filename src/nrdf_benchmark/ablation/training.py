@@ -1,4 +1,4 @@
-"""Table III's trainings: without each loss of the last stage, and with all of them, by some seeds.
+"""Table III's trainings: without each loss of the last stage, and with all of them.
 
 The stages before the last are the same in every variant, so they are trained once: `shared/` in the
 output folder is a run that every variant begins from (`nrdf.training.loop.train`).
@@ -48,17 +48,15 @@ def variant_config(config: TrainConfig, variant: str, seed: int = 0) -> TrainCon
     """
     if variant not in VARIANTS:
         raise ConfigError(unknown_name("variant", variant, VARIANTS))
-    stage = config.stages[-1]
-    if seed:
-        stage = stage.model_copy(update={"seed": seed})
-    loss = OMITTED.get(variant)
+    stage, loss = config.stages[-1], OMITTED.get(variant)
     if loss is not None and loss not in stage.weights:
         raise ConfigError(
             f"variant '{variant}' leaves out '{loss}', which the last stage '{stage.name}' does "
             f"not have: {', '.join(stage.weights)}"
         )
     weights = {name: weight for name, weight in stage.weights.items() if name != loss}
-    stages = [*config.stages[:-1], stage.model_copy(update={"weights": weights})]
+    changes = {"weights": weights, "seed": seed or stage.seed}
+    stages = [*config.stages[:-1], stage.model_copy(update=changes)]
     return config.model_copy(update={"stages": stages})
 
 
@@ -102,7 +100,7 @@ def train_variants(
 
     def run(name: str, wanted: TrainConfig, begin: Path | None, what: str) -> None:
         folder = out / name
-        with _alone(out, name):
+        with turn(out, name):
             identity = run_identity(wanted, category, shapes)
             if open_run(folder, identity, overwrite) and (folder / WEIGHTS).is_file():
                 log.info("%s: trained already", what)
@@ -146,6 +144,6 @@ def _timed(run: Path) -> Iterator[None]:
             write_json(run / COST, {"seconds": round(seconds, 3)})
 
 
-def _alone(out: Path, name: str) -> AbstractContextManager[None]:
-    """Other processes that want the same run wait meanwhile; `train` refuses a second one."""
+def turn(out: Path, name: str) -> AbstractContextManager[None]:
+    """Other processes that want to train or score the same run of `out` wait meanwhile."""
     return write_lock(out / f"turn at {name}", wait=True)

@@ -103,7 +103,8 @@ def ablate(
     runs[ablation.SHARED, 0] = out / ablation.SHARED
     for (variant, seed), run in runs.items():
         model = nrdf.load_model(run, str(chosen))
-        with progress_bar(ablation.describe(variant)) as progress:
+        # What is scored is kept in the run, and a process with other variants may want it too.
+        with ablation.turn(out, run.name), progress_bar(ablation.describe(variant)) as progress:
             if bsrc is None:
                 regions = ablation_table.score(FieldMethod(model, "points"), cases, progress)
             else:

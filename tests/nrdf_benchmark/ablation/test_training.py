@@ -138,14 +138,14 @@ def test_one_process_waits_for_the_other(tmp_path):
 
     def second():
         held.wait()
-        with ablation._alone(tmp_path, "cd"):
+        with ablation.turn(tmp_path, "cd"):
             order.append("second")
 
     thread = threading.Thread(target=second)
     thread.start()
-    with ablation._alone(tmp_path, "cd"):
+    with ablation.turn(tmp_path, "cd"):
         held.set()
-        with ablation._alone(tmp_path, "emd"):
+        with ablation.turn(tmp_path, "emd"):
             thread.join(0.2)
             order.append("first")
     thread.join()
