@@ -98,9 +98,9 @@ def examples_of_objects(
     return found
 
 
-def examples_of_members(scorer: PoseScorer, pair: int) -> list[Example]:
-    """Every region of one family member, sought on another, whole and in scans."""
-    category = scorer.model.category
+def examples_of_members(scorer: PoseScorer, category: str, pair: int) -> list[Example]:
+    """Every region of one member of a family, sought on another by the scorer's model, whole and
+    in scans."""
     results = score_regions(scorer, category, pair, FIRST_SEED, drop_absent=False)
     names = f"{category} {2 * pair}", f"{category} {2 * pair + 1}"
     return [

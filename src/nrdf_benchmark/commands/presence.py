@@ -22,7 +22,7 @@ def presence(
     model: str = "chair",
     group: tuple[str, ...] = ("chair+stool",),
     seek: str | None = None,
-    category: tuple[Literal["chair", "car", "plane"], ...] = ("chair", "plane"),
+    category: tuple[Literal["chair", "car", "plane"], ...] | None = None,
     pairs: int = 12,
     device: str = "cpu",
 ) -> None:
@@ -41,11 +41,12 @@ def presence(
         objects: Folder of labelled objects, as of nrdf eval objects.
         group: Categories of labelled objects to take, joined by "+" where they share parts. Only
             those of the first are scanned as well, and aligned by the model.
-        seek: Fit the rule of this model instead, on labelled objects only: a zoo name, such as
-            registration or general, or a weight file.
+        seek: Fit the rule of this model instead, on labelled objects, and on the families that are
+            given: a zoo name, such as registration or general, or a weight file.
         model: Zoo name, weight file or run, for the labelled objects.
-        category: Families: chair, car, plane, or several of them. The zoo's cars are mapped by the
-            general model, whose evidence is of another kind.
+        category: Families: chair, car, plane, or several of them; without --seek chair and plane
+            unless given. The zoo's cars are mapped by the general model, whose evidence is of
+            another kind.
         pairs: Pairs of members of each family, about 10 s each on one core.
         device: cpu, cuda, cuda:N or auto.
     """
@@ -77,15 +78,17 @@ def presence(
                     out, name, partial(examples_of_objects, retrieval, key, other, views, seeker)
                 )
                 progress(done, len(chosen))
-    for name in () if seek else category:
+    if category is None:
+        category = () if seek else ("chair", "plane")
+    for name in category:
         scorer = None
         with progress_bar(f"pairs of {name}s") as progress:
             for done, pair in enumerate(choose_pairs(name, pairs), 1):
 
                 def collect(name: str = name, pair: int = pair) -> list[Example]:
                     nonlocal scorer
-                    scorer = scorer or _scorer(name, device)
-                    return examples_of_members(scorer, pair)
+                    scorer = scorer or _scorer(name, seek or name, device)
+                    return examples_of_members(scorer, name, pair)
 
                 every += load_or_collect(out, f"{name}-{pair:03d}", collect)
                 progress(done, pairs)
@@ -123,8 +126,8 @@ def _open_objects(
     return ObjectRetrieval(settings), pairs
 
 
-def _scorer(name: str, device: str) -> PoseScorer:
+def _scorer(category: str, model: str, device: str) -> PoseScorer:
     import nrdf
-    from nrdf.scans.pose_scorer import PoseScorer
+    from nrdf.scans.pose_scorer import PoseScorer, family_prototypes
 
-    return PoseScorer(nrdf.load_model(name, device))
+    return PoseScorer(nrdf.load_model(model, device), family_prototypes(category))

@@ -12,7 +12,7 @@ from nrdf_benchmark.presence import Example
 def test_what_was_measured_is_fitted_shown_and_used_again(tmp_path, untrained, monkeypatch, capsys):
     measured = []
 
-    def examples(scorer, pair):
+    def examples(scorer, category, pair):
         measured.append(pair)
         rng = np.random.default_rng(pair)
         found = []
@@ -65,3 +65,17 @@ def test_another_model_seeks_the_parts_for_a_rule_of_its_own(tmp_path, monkeypat
     assert cli.run(words.split()) == 0
     assert seekers == ["registration"] * 19  # every third pair; no family beside them
     assert "family" not in capsys.readouterr().out
+
+    members = []
+
+    def of_members(scorer, category, pair):
+        members.append((scorer.model.preset, scorer.prototypes, category, pair))
+        return [
+            Example("family car", "full", f"car {pair}", "car 1", "1", 0.5, False, (3, 3, 0, 3))
+        ]
+
+    monkeypatch.setattr(presence, "choose_pairs", lambda category, count: [3, 7][:count])
+    monkeypatch.setattr(presence, "examples_of_members", of_members)
+    assert cli.run([*words.split(), "--category", "car"]) == 0
+    assert members == [("registration", 8, "car", 3), ("registration", 8, "car", 7)]
+    assert len(seekers) == 19 and "family car" in capsys.readouterr().out
