@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT
+from nrdf.geometry.normals import oriented_features
 from nrdf_benchmark.bsrc.dataset import OPPOSITE_SIDES, ROIS, BenchmarkObject
 
 VERSION = 1

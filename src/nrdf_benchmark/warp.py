@@ -13,8 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError, ProcessError
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT
 from nrdf.geometry.frames import z_axes
+from nrdf.geometry.normals import oriented_features
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.correspondence import Correspondence

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset, oriented_features
+from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.geometry.canonical import rotation_about_up
+from nrdf.geometry.normals import oriented_features
 from nrdf.geometry.similarity import Similarity
 from nrdf.io.cloud import PointCloud
 

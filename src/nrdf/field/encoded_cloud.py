@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.normals import oriented_features, oriented_tree
 from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.geometry.similarity import Similarity
 from nrdf.geometry.visibility import seen_from_both_sides
@@ -16,14 +17,6 @@ from nrdf.io.cloud import PointCloud
 
 NORMAL_WEIGHT = 0.1
 """Canonical length that one unit of normal difference counts for: tells thin sides apart."""
-
-
-def oriented_features(points: np.ndarray, normals: np.ndarray, weight: float) -> np.ndarray:
-    """Positions and weighted normals side by side, (n, 6), for nearest neighbours in both.
-
-    With weight 0 only the positions, (n, 3), which is faster.
-    """
-    return np.concatenate([points, weight * normals], axis=1) if weight else points
 
 
 @dataclass(frozen=True)
@@ -117,7 +110,7 @@ class EncodedCloud:
 
     @cached_property
     def _oriented_tree(self) -> cKDTree:
-        return cKDTree(oriented_features(self.points, self.normals, NORMAL_WEIGHT))
+        return oriented_tree(self.points, self.normals, NORMAL_WEIGHT)
 
     @cached_property
     def tree(self) -> cKDTree:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud
 from nrdf.geometry.frames import unit_vectors
+from nrdf.geometry.normals import oriented_features
 from nrdf.geometry.sampling import downsample
 from nrdf.regions.reference import EncodedReference
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT
+from nrdf.geometry.normals import oriented_features, oriented_tree
 
 VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""
@@ -26,7 +26,7 @@ def snap(
     mapped (m, 3), target (n, 3) canonical; normals of the same shapes, used when `normal_weight`
     is above 0.
     """
-    tree = cKDTree(oriented_features(target, target_normals, normal_weight))
+    tree = oriented_tree(target, target_normals, normal_weight)
     distance, index = tree.query(oriented_features(mapped, mapped_normals, normal_weight))
     return index, distance
 
@@ -44,7 +44,7 @@ def nearest_voters(
     mapped (m, 3), target (n, 3) canonical, with their normals. Returns the voters' indices
     (n, count) into `mapped` and distances (n, count).
     """
-    tree = cKDTree(oriented_features(mapped, mapped_normals, normal_weight))
+    tree = oriented_tree(mapped, mapped_normals, normal_weight)
     distance, index = tree.query(
         oriented_features(target, target_normals, normal_weight),
         k=np.arange(1, min(count, len(mapped)) + 1),

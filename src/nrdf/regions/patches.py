@@ -21,6 +21,7 @@ _REACH = 1.25
 # Points are neighbours up to this multiple of the median distance to the 7th nearest.
 _NEIGHBOURHOOD = 1.5
 _NEAREST = 7
+_SOME = 1024  # points of which that median is taken
 
 
 def explained_by(distance: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -69,16 +70,17 @@ def find_patches(points: np.ndarray, explained: np.ndarray) -> Patches:
     if explained.all():
         return Patches(explained, label, nobody)
     tree = cKDTree(points)
-    nearest = tree.query(points, [min(_NEAREST + 1, count)])[0]
-    first, second = tree.query_pairs(
-        _NEIGHBOURHOOD * float(np.median(nearest)), output_type="ndarray"
-    ).T
-    within = ~explained[first] & ~explained[second]
+    some = points[:: max(1, count // _SOME)]
+    nearest = tree.query(some, [min(_NEAREST + 1, count)])[0]
+    unexplained = np.flatnonzero(~explained)
+    # Only what is near unexplained points is looked for; they are few as a rule.
+    pairs = cKDTree(points[unexplained]).sparse_distance_matrix(
+        tree, _NEIGHBOURHOOD * float(np.median(nearest)), output_type="ndarray"
+    )
+    first, second = unexplained[pairs["i"]], pairs["j"]
+    within = ~explained[second]
     ones = np.ones(int(within.sum()))
     graph = coo_matrix((ones, (first[within], second[within])), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
-    across = explained[first] != explained[second]
-    first, second = first[across], second[across]
-    swap = explained[first]
-    patch, beside = np.where(swap, second, first), np.where(swap, first, second)
+    patch, beside = first[~within], second[~within]
     return Patches(explained, label, np.stack([label[patch], beside], axis=1))

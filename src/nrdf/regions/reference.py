@@ -13,9 +13,10 @@ import numpy as np
 
 from nrdf.errors import RegionError, unknown_name
 from nrdf.field.cloud_encoder import CloudEncoder
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud
 from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION
+from nrdf.geometry.normals import oriented_features
 from nrdf.io.inputs import as_cloud
 from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
 from nrdf.regions.field_mapper import FieldMapper

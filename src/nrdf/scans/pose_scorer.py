@@ -21,9 +21,9 @@ from nrdf.field.encoded_cloud import (
     NORMAL_WEIGHT,
     EncodedCloud,
     encoder_subset,
-    oriented_features,
 )
 from nrdf.geometry.canonical import canonical_transform, rotation_about_up
+from nrdf.geometry.normals import oriented_features
 from nrdf.geometry.sampling import downsample
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.registration import RegistrationSettings, RegistrationTemplate

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nrdf.errors import NrdfError, ProcessError
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT, oriented_features
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT
 from nrdf.geometry.mesh import Mesh
+from nrdf.geometry.normals import oriented_features
 from nrdf.geometry.simplify import simplified
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
