@@ -72,12 +72,13 @@ def examples_of_objects(
 
     model: the retrieval's, which aligns the scans, unless given.
     """
+    model = model or retrieval.model
     regions, cloud = retrieval.regions(reference), retrieval.whole_cloud(reference).cloud
-    encoded_reference, found = (model or retrieval.model).set_reference(cloud), []
+    encoded_reference, found = model.set_reference(cloud), []
     for number in views:
         seen, truth = retrieval.target_cloud(target, number), retrieval.truth(target)
         for name, match in encoded_reference.retrieve_all(
-            regions, seen.encoded, drop_absent=False, check=False
+            regions, seen.seen_by(model), drop_absent=False, check=False
         ).items():
             state = state_of(name, truth, seen.labelled)
             if state not in (THERE, ABSENT):

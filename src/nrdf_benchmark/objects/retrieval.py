@@ -23,7 +23,7 @@ from nrdf.regions.model import Model
 from nrdf.scans.aligned_scan import AlignedScan, clean_and_align
 from nrdf.scans.pose_scorer import PoseScorer
 from nrdf_benchmark.methods.learned import FieldMethod
-from nrdf_benchmark.methods.registry import METHODS, Method, MethodSpec, build_method
+from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method
 from nrdf_benchmark.objects.dataset import (
     LabelledMesh,
     Labels,
@@ -109,6 +109,13 @@ class TargetCloud:
     pose: Pose | None = None
     aligned: AlignedScan | None = None
 
+    def seen_by(self, model: Model) -> EncodedCloud:
+        """The target as a model sees it, in the pose that was found for all: its embedding is of
+        the general field where that maps, and of the model that aligned it otherwise."""
+        if model.preset == GENERAL:
+            return model.encode(self.encoded.cloud, self.encoded.pose)
+        return self.encoded
+
     def in_cloud(self, found: np.ndarray) -> np.ndarray:
         """Indices of `canonical` as those of all points of the cloud."""
         chosen = np.zeros(len(self.encoded.points), bool)
@@ -149,7 +156,9 @@ class ObjectRetrieval:
         regions, target_cloud = self.regions(reference), self.target_cloud(target, views)
         match, cloud = build_method(spec), self.whole_cloud(reference).cloud
         matches: dict[str, Match] = {}
-        encoded = self._encoded_for(match, target_cloud)
+        encoded = target_cloud.encoded
+        if isinstance(match, FieldMethod):
+            encoded = target_cloud.seen_by(match.model)
         start = time.perf_counter()
         if isinstance(match, FieldMethod):
             matches = match.find(cloud, regions, encoded)
@@ -160,12 +169,6 @@ class ObjectRetrieval:
             found = match(cloud, regions, target_cloud.canonical)
             found = {name: target_cloud.in_cloud(indices) for name, indices in found.items()}
         return found, matches, time.perf_counter() - start
-
-    def _encoded_for(self, match: Method, target: TargetCloud) -> EncodedCloud:
-        """The target as a method's own model sees it, in the pose that was found for all."""
-        if isinstance(match, FieldMethod) and match.model.preset == GENERAL:
-            return match.model.encode(target.encoded.cloud, target.encoded.pose)
-        return target.encoded
 
     def run(self, spec: MethodSpec, views: int, reference: str, target: str) -> ObjectPairResult:
         """Find all parts of a reference on a target by one method, and score them."""

@@ -8,9 +8,11 @@ import pytest
 
 from builders.labelled_boxes import IKEA, write_objects
 from nrdf.field.zoo import find_weights
+from nrdf.regions.model import load_model
 from nrdf_benchmark.methods.registry import MethodSpec, find_methods
 from nrdf_benchmark.objects.retrieval import Settings, shared_retrieval
 from nrdf_benchmark.objects.table import rows_of
+from nrdf_benchmark.presence import examples_of_objects
 
 LOW, HIGH, STOOL = "chair/low", "chair/high", "stool/plain"
 
@@ -32,6 +34,17 @@ def test_parts_are_found_in_scans_by_every_method_in_the_pose_that_was_found(set
         )
         for part in result.parts:
             assert part.state == "there" and part.iou > 0.5, (result.method, part)
+
+
+def test_a_model_that_seeks_sees_the_target_by_its_own_embedding(settings):
+    """Not by that of the model which the objects were encoded and aligned with."""
+    retrieval, general = shared_retrieval(settings), load_model("general")
+    regions, reference = retrieval.regions(LOW), retrieval.whole_cloud(LOW).cloud
+    cloud = retrieval.whole_cloud(HIGH).cloud
+    matches = general.set_reference(reference).retrieve_all(regions, cloud, drop_absent=False)
+    for example in examples_of_objects(retrieval, LOW, HIGH, (0,), general):
+        evidence = matches[example.region].presence.evidence
+        assert example.evidence == pytest.approx(evidence, abs=1e-6)
 
 
 def by_part(result):
