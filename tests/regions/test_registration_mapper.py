@@ -10,6 +10,7 @@ import pytest
 import nrdf
 from builders.small_model import chair
 from nrdf.io.cloud import PointCloud
+from nrdf.regions.presence import FIELD_RULE, REGISTRATION_RULE
 from nrdf.regions.registration_mapper import RegistrationMapper
 
 STRETCH = np.array([0.9, 1.0, 1.15])
@@ -34,6 +35,12 @@ def stretched(model):
 def errors(found, encoded, points):
     """Distances (m,) of mapped points from points (m, 3) of the target's cloud, canonical."""
     return np.linalg.norm(found.points - encoded.canonical(points), axis=1)
+
+
+def test_presence_is_told_by_the_rule_of_what_begins_the_map(mapper, model):
+    general = nrdf.load_model("general")
+    begun = RegistrationMapper(general.encode(chair()[0]), general)
+    assert (mapper.presence_rule, begun.presence_rule) == (REGISTRATION_RULE, FIELD_RULE)
 
 
 def test_a_stretched_copy_is_followed(mapper, stretched):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 import torch
@@ -24,7 +23,7 @@ _CHUNK = 8192  # points described or inverted at a time
 class FieldMapper:
     """Maps a source's surface by C of its descriptors (paper, eq. 8), which are kept."""
 
-    presence_rule: ClassVar[PresenceRule] = FIELD_RULE
+    presence_rule: PresenceRule = FIELD_RULE
 
     def __init__(self, model: CloudEncoder, source: EncodedCloud) -> None:
         self.model, self.source = model, source

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class SurfaceMapper(Protocol):
     (`nrdf.regions.registration_mapper`) do. Points and normals (m, 3) are canonical.
     """
 
-    presence_rule: ClassVar[PresenceRule]
+    presence_rule: PresenceRule
     """How the presence of regions is told from what this predicts."""
 
     def map_working(self, target: EncodedCloud, chosen: np.ndarray | None = None) -> MappedPoints:

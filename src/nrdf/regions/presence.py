@@ -51,7 +51,8 @@ class PresenceRule:
 
 # Logistic regressions of the overlap with the true region, 0 where the target lacks it, on parts
 # of labelled real objects and on members of families, whole and in scans of three views: what
-# `nrdf eval presence` prints (docs/evidence/scans.md).
+# `nrdf eval presence` prints (docs/evidence/scans.md). The field's holds for the general model as
+# well, which it was not fitted on: one that was is no better (docs/evidence/general.md).
 FIELD_RULE = PresenceRule(-0.98, Evidence(existence=0.17, trust=0.77, size=0.71, returned=0.48))
 REGISTRATION_RULE = PresenceRule(
     0.39, Evidence(existence=0.35, trust=1.09, size=2.29, returned=-0.05)

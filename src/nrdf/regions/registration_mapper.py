@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from functools import cached_property
 from threading import Lock
-from typing import ClassVar
 
 import numpy as np
 import torch
@@ -24,7 +23,7 @@ from nrdf.field.cloud_encoder import CloudEncoder
 from nrdf.field.encoded_cloud import EncodedCloud
 from nrdf.field.general import GeneralField
 from nrdf.regions.mapping import MappedPoints
-from nrdf.regions.presence import REGISTRATION_RULE, PresenceRule
+from nrdf.regions.presence import FIELD_RULE, REGISTRATION_RULE, PresenceRule
 from nrdf.shapes.registration import (
     DisplacementInterpolator,
     RegistrationSettings,
@@ -48,10 +47,9 @@ class RegistrationMapper:
     take about 270 MB, half as much with a field.
     """
 
-    presence_rule: ClassVar[PresenceRule] = REGISTRATION_RULE
-
     def __init__(self, source: EncodedCloud, model: CloudEncoder | None = None) -> None:
         self.source, self._model = source, model
+        self.presence_rule: PresenceRule = REGISTRATION_RULE if model is None else FIELD_RULE
         self._settings = RegistrationSettings() if model is None else _FROM_FIELD
         self._chosen = _subset(len(source.points), _POINTS, 0)
         self._template = RegistrationTemplate(
