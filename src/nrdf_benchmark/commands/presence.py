@@ -10,6 +10,8 @@ from nrdf.commands.options import Folder
 from nrdf.commands.output_lock import lock_output
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark.objects.retrieval import ObjectRetrieval
     from nrdf_benchmark.presence import Example
@@ -31,8 +33,9 @@ def presence(
     Parts of labelled objects, and regions of pairs of family members that no training has seen, are
     sought whole and in simulated scans; a logistic regression tells from what a retrieval knows of
     itself how well they overlap with the truth, and which the target lacks. Shows its coefficients,
-    to be compared with those in nrdf/regions/presence.py, and what rules tell that were fitted on
-    other products and pairs. Started again, it goes on where it was.
+    to be compared with those in nrdf/regions/presence.py, what rules tell that were fitted on
+    other products and pairs, and what the rule in use tells. Started again, it goes on where it
+    was.
 
     Example: nrdf eval presence --objects objects/ --out runs/presence
 
@@ -55,6 +58,8 @@ def presence(
     import numpy as np
 
     import nrdf
+    from nrdf.field.registration import REGISTRATION
+    from nrdf.regions.presence import FIELD_RULE, REGISTRATION_RULE
     from nrdf_benchmark.presence import (
         OBJECT_STEP,
         choose_pairs,
@@ -63,7 +68,6 @@ def presence(
         examples_of_objects,
         fit,
         load_or_collect,
-        summary,
     )
 
     every: list[Example] = []
@@ -78,9 +82,8 @@ def presence(
                     out, name, partial(examples_of_objects, retrieval, key, other, views, seeker)
                 )
                 progress(done, len(chosen))
-    if category is None:
-        category = () if seek else ("chair", "plane")
-    for name in category:
+    families = category or (() if seek else ("chair", "plane"))
+    for name in families:
         scorer = None
         with progress_bar(f"pairs of {name}s") as progress:
             for done, pair in enumerate(choose_pairs(name, pairs), 1):
@@ -95,15 +98,27 @@ def presence(
     rule = fit(every)
     weights = ", ".join(f"{weight:.2f}" for weight in rule.weights)
     console.print(f"bias {rule.bias:.2f}; weights {weights}")
-    overlap = cross_validate(every)
+    _show("fitted on other products and pairs", every, cross_validate(every))
+    used = FIELD_RULE
+    if seek is not None and nrdf.load_model(seek, device).preset == REGISTRATION:
+        used = REGISTRATION_RULE
+    _show("by the rule in use", every, used.overlap(np.array([e.evidence for e in every])))
+
+
+def _show(title: str, examples: list[Example], overlap: np.ndarray) -> None:
+    """Table of what expected overlaps (n,) tell of examples, and how they go with the true ones."""
+    import numpy as np
+
+    from nrdf_benchmark.presence import summary
+
     heading = ("of", "told absent", "skipped", "overlap expected", "true")
-    shown = table("fitted on other products and pairs", "", "", "", *heading, texts=3)
-    for source, kind, state, of, told, skipped, mean, true in summary(every, overlap):
+    shown = table(title, "", "", "", *heading, texts=3)
+    for source, kind, state, of, told, skipped, mean, true in summary(examples, overlap):
         counts = (str(of), str(told), str(skipped))
         shown.add_row(source, kind, state, *counts, f"{mean:.2f}", f"{true:.2f}")
     show(shown)
-    there = np.array([not e.absent for e in every])
-    truth = np.array([e.overlap for e in every])
+    there = np.array([not e.absent for e in examples])
+    truth = np.array([e.overlap for e in examples])
     correlation = np.corrcoef(overlap[there], truth[there])[0, 1]
     console.print(f"correlation of expected and true overlap of what is there: {correlation:.2f}")
 

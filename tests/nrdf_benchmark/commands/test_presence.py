@@ -39,7 +39,8 @@ def test_what_was_measured_is_fitted_shown_and_used_again(tmp_path, untrained, m
     assert cli.run(words) == 0
     shown = capsys.readouterr().out
     assert measured == [3, 7] and "bias " in shown and "correlation of expected" in shown
-    assert shown.count("family chair") == 2  # those that are there, and those that are absent
+    assert shown.count("family chair") == 4  # there and absent, by each of two rules
+    assert "by the rule in use" in shown
     assert cli.run(words) == 0
     assert measured == [3, 7] and capsys.readouterr().out == shown
 

@@ -12,7 +12,7 @@ from builders.bsrc_folder import member_clouds
 from builders.small_model import SMALL
 from nrdf.errors import ConfigError, ModelError
 from nrdf.field import build_field
-from nrdf.field.weights import save_weights
+from nrdf.field.weights import load_weights, save_weights
 from nrdf.io.cloud import PointCloud
 from nrdf_benchmark.methods import registry
 from nrdf_benchmark.methods.registry import METHODS, MethodSpec, build_method, find_methods
@@ -75,6 +75,15 @@ def test_rivals_that_were_not_trained_here_come_from_the_benchmarks_zoo(tmp_path
     trained = save(tmp_path / "runs" / "chair-ndf" / "weights.safetensors", "ndf")
     (spec,) = find_methods(["ndf"], "chair", runs=tmp_path / "runs")
     assert spec.weights == trained.resolve()
+
+
+@pytest.mark.parametrize("category", ["chair", "car", "plane"])
+def test_ndf_comes_with_the_benchmark(tmp_path, category):
+    (spec,) = find_methods(["ndf"], category, runs=tmp_path)
+    assert spec.weights == registry.ZOO / f"{category}-ndf.safetensors"
+    assert spec.weights.stat().st_size < 4e6
+    field, metadata = load_weights(spec.weights, "ndf", category)
+    assert field.config.descriptor_size == 769 and metadata["shapes"]
 
 
 @pytest.mark.parametrize(
