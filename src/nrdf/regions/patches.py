@@ -21,7 +21,6 @@ _REACH = 1.25
 # Points are neighbours up to this multiple of the median distance to the 7th nearest.
 _NEIGHBOURHOOD = 1.5
 _NEAREST = 7
-_SOME = 1024  # points of which that median is taken
 
 
 def explained_by(distance: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -70,8 +69,7 @@ def find_patches(points: np.ndarray, explained: np.ndarray) -> Patches:
     if explained.all():
         return Patches(explained, label, nobody)
     tree = cKDTree(points)
-    some = points[:: max(1, count // _SOME)]
-    nearest = tree.query(some, [min(_NEAREST + 1, count)])[0]
+    nearest = tree.query(points, [min(_NEAREST + 1, count)])[0]
     unexplained = np.flatnonzero(~explained)
     # Only what is near unexplained points is looked for; they are few as a rule.
     pairs = cKDTree(points[unexplained]).sparse_distance_matrix(
