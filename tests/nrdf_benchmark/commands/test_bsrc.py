@@ -72,7 +72,7 @@ def test_another_metric_is_printed_without_published_rows(root, capsys):
         ("--data nowhere --method copy", "there is no folder nowhere; expected folders"),
         ("--method copi", "no method 'copi'; known: copy, box"),
         ("--method copy --metric cd", "no metric 'cd'; known: cd-l1"),
-        ("--method ndf --runs none", "expected none/chair-ndf/weights.safetensors"),
+        ("--method imdc --runs none", "expected none/chair-imdc/weights.safetensors"),
         ("--method nrdf --model car", "needs weights of category 'chair'"),
     ],
 )
