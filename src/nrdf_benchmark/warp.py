@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from nrdf.errors import DataError, ProcessError
 from nrdf.field.encoded_cloud import NORMAL_WEIGHT
 from nrdf.geometry.frames import z_axes
-from nrdf.geometry.normals import oriented_features
+from nrdf.geometry.normals import oriented_features, oriented_tree
 from nrdf.io.cloud import PointCloud
 from nrdf.process.bound_knowledge import BoundKnowledge
 from nrdf.process.correspondence import Correspondence
@@ -141,7 +140,7 @@ class _Truth:
         dense = reference.sample_surface(_TRUTH_POINTS, rng)
         located = target.locate(dense.coordinates)
         self._points, self._there, self._exists = dense.points, located.points, located.exists
-        self._tree = cKDTree(oriented_features(dense.points, dense.normals, NORMAL_WEIGHT))
+        self._tree = oriented_tree(dense.points, dense.normals, NORMAL_WEIGHT)
 
     def positions(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The true positions (m, 3) of points (m, 3) with normals (m, 3), and which exist (m,)."""

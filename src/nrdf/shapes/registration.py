@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.normals import oriented_features
+
 Array = np.ndarray
 _NEIGHBOURS = 4
 _ALL_COMPARED = 2**19  # pairs of points up to which comparing all of them is faster than trees
@@ -141,8 +143,8 @@ def _match(
     moved: Array, own: Array, target: Array, normals: Array, normal_weight: float
 ) -> tuple[Array, Array, Array, Array]:
     """Nearest neighbours both ways in (position, weighted normal): distances and indices."""
-    moved_features = np.concatenate([moved, normal_weight * own], 1)
-    target_features = np.concatenate([target, normal_weight * normals], 1)
+    moved_features = oriented_features(moved, own, normal_weight)
+    target_features = oriented_features(target, normals, normal_weight)
     if len(moved) * len(target) <= _ALL_COMPARED:
         return _match_all(moved_features, target_features)
     to_target, target_index = cKDTree(target_features).query(moved_features)

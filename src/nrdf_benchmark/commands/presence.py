@@ -12,6 +12,7 @@ from nrdf.commands.output_lock import lock_output
 if TYPE_CHECKING:
     import numpy as np
 
+    from nrdf.regions.model import Model
     from nrdf.scans.pose_scorer import PoseScorer
     from nrdf_benchmark.objects.retrieval import ObjectRetrieval
     from nrdf_benchmark.presence import Example
@@ -71,9 +72,9 @@ def presence(
     )
 
     every: list[Example] = []
+    seeker = nrdf.load_model(seek, device) if seek else None
     if objects is not None:
         retrieval, pairs_of_objects = _open_objects(objects, group, model, device)
-        seeker = nrdf.load_model(seek, device) if seek else retrieval.model
         chosen = pairs_of_objects[::OBJECT_STEP]
         with progress_bar("parts of objects") as progress:
             for done, (key, other, views) in enumerate(chosen, 1):
@@ -90,7 +91,7 @@ def presence(
 
                 def collect(name: str = name, pair: int = pair) -> list[Example]:
                     nonlocal scorer
-                    scorer = scorer or _scorer(name, seek or name, device)
+                    scorer = scorer or _scorer(name, seeker or nrdf.load_model(name, device))
                     return examples_of_members(scorer, name, pair)
 
                 every += load_or_collect(out, f"{name}-{pair:03d}", collect)
@@ -99,9 +100,8 @@ def presence(
     weights = ", ".join(f"{weight:.2f}" for weight in rule.weights)
     console.print(f"bias {rule.bias:.2f}; weights {weights}")
     _show("fitted on other products and pairs", every, cross_validate(every))
-    used = FIELD_RULE
-    if seek is not None and nrdf.load_model(seek, device).preset == REGISTRATION:
-        used = REGISTRATION_RULE
+    by_registration = seeker is not None and seeker.preset == REGISTRATION
+    used = REGISTRATION_RULE if by_registration else FIELD_RULE
     _show("by the rule in use", every, used.overlap(np.array([e.evidence for e in every])))
 
 
@@ -141,8 +141,7 @@ def _open_objects(
     return ObjectRetrieval(settings), pairs
 
 
-def _scorer(category: str, model: str, device: str) -> PoseScorer:
-    import nrdf
+def _scorer(category: str, model: Model) -> PoseScorer:
     from nrdf.scans.pose_scorer import PoseScorer, family_prototypes
 
-    return PoseScorer(nrdf.load_model(model, device), family_prototypes(category))
+    return PoseScorer(model, family_prototypes(category))
