@@ -86,6 +86,9 @@ class Stage(StrictModel):
     rate: float = Field(default=1e-4, gt=0)
     pools: dict[str, float] | None = None
     """Shares of the sources in this stage's batches, instead of `data.pools`."""
+    encoder_points: int | None = Field(default=None, ge=1)
+    queries: int | None = Field(default=None, ge=0)
+    """Points and queries a shape in this stage, instead of those of `data`."""
     schedule: Literal["constant", "cosine"] = "constant"
     warmup: int = Field(default=0, ge=0)
     """Steps over which the rate rises linearly from zero."""

@@ -17,7 +17,7 @@ from nrdf.errors import DataError
 from nrdf.shapes.dataset import Correspondence, Shape, read_shape
 from nrdf.training.augment import draw_deformation, draw_sample, sensor_noise
 from nrdf.training.batch import Batch, pair_up, seeded
-from nrdf.training.config import AugmentConfig, DataConfig
+from nrdf.training.config import AugmentConfig, DataConfig, Stage
 from nrdf.training.correspondences import CorrespondenceGroups, to_tensor
 from nrdf.training.cuts import draw_cuts
 from nrdf.training.pools import draw_shapes, find_pools, pool_sizes
@@ -73,15 +73,18 @@ class ShapeDataset:
     def __len__(self) -> int:
         return len(self.names)
 
-    def with_pools(self, shares: dict[str, float] | None) -> ShapeDataset:
-        """The same shapes in other shares; itself where `shares` is None.
+    def for_stage(self, stage: Stage) -> ShapeDataset:
+        """The same shapes as a stage draws them: in its shares, as many points and queries.
 
-        Raises ConfigError when the pools leave a shape out.
+        Raises ConfigError when its pools leave a shape out.
         """
-        if shares is None:
-            return self
         other = copy(self)
-        other.pools = find_pools(self.sources, shares)
+        own = {"encoder_points": stage.encoder_points, "queries": stage.queries}
+        other.config = self.config.model_copy(
+            update={name: value for name, value in own.items() if value is not None}
+        )
+        if stage.pools is not None:
+            other.pools = find_pools(self.sources, stage.pools)
         return other
 
     def plain(self) -> dict[str, ShapeDataset]:

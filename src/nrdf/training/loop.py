@@ -152,7 +152,7 @@ def run_stages(
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
     lengths = [
-        stage_steps(stage, dataset.with_pools(stage.pools), workers.world)
+        stage_steps(stage, dataset.for_stage(stage), workers.world)
         for stage in config.stages
     ]
     precision = choose_precision(config.precision, workers.device)
@@ -178,7 +178,7 @@ def run_stages(
                 continue
             if position.stage < number:
                 position, checkpoint = Position(number, 0, position.total), None
-            pooled = dataset.with_pools(stage.pools)
+            drawn = dataset.for_stage(stage)
             base = config.seed if stage.seed is None else stage.seed
             parameters = select_parts(field, stage)
             optimizer = make_optimizer(field, stage, config.optimizer)
@@ -192,7 +192,7 @@ def run_stages(
 
             for step in range(position.step, length):
                 seed = base + 7919 * number
-                batch = pooled.batch(stage.batch_size, seed, step, workers.rank, workers.world)
+                batch = drawn.batch(stage.batch_size, seed, step, workers.rank, workers.world)
                 # Dropout and the like draw from the global generator.
                 torch.manual_seed(base * 1_000_003 + position.total)
                 generator = seeded(workers.device, seed, step, workers.rank, 1)

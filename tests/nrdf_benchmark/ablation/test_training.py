@@ -61,7 +61,11 @@ def test_a_variant_lacks_one_loss_of_the_last_stage_and_nothing_else():
         assert changed.model_copy(update={"stages": [*changed.stages[:-1], last]}) == paper
     assert shared_config(paper).stages == paper.stages[:-1]
     trained = load_config("paper-short")
-    assert trained.model_copy(update={"stages": trained.stages[:2]}) == shared_config(paper)
+    assert trained.stages[2] == paper.stages[1], "self reconstruction"
+    losses = trained.stages[3].weights
+    assert losses == paper.stages[2].weights
+    shared = {"stages": paper.stages}
+    assert trained.model_copy(update=shared) == paper.model_copy(update=shared)
 
 
 def test_variants_that_cannot_be_are_refused():
