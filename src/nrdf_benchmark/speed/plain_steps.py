@@ -61,12 +61,13 @@ def compare_steps(preset: str, threads: int, steps: int) -> list[StepComparison]
         select_parts(field, stage)
         optimizer = make_optimizer(field, stage, config.optimizer)
         ours = Objective(field, stage, config, torch.bfloat16)
+        drawn = dataset.for_stage(stage.model_copy(update={"pools": None}))
         least = []
         for is_plain in (False, True):
             wall, cpu = [], []
             for step in range(steps + 1):
                 generator = seeded(torch.device("cpu"), number, step)
-                batch = dataset.batch(stage.batch_size, number, step)
+                batch = drawn.batch(stage.batch_size, number, step)
                 begun, used = time.perf_counter(), time.process_time()
                 if is_plain:
                     terms = plain.losses(batch, tuple(stage.weights), generator)
