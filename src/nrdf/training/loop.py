@@ -152,8 +152,7 @@ def run_stages(
     torch.manual_seed(config.seed)
     field = build_field(config.preset, config.field).to(workers.device)
     lengths = [
-        stage_steps(stage, dataset.for_stage(stage), workers.world)
-        for stage in config.stages
+        stage_steps(stage, dataset.for_stage(stage), workers.world) for stage in config.stages
     ]
     precision = choose_precision(config.precision, workers.device)
 
