@@ -12,11 +12,10 @@ from nrdf.field import build_field
 from nrdf.field.paper import PaperField
 from nrdf.training.batch import seeded
 from nrdf.training.config import load_config
-from nrdf.training.dataset import ShapeDataset
 from nrdf.training.loop import Objective, select_parts
 from nrdf.training.optimizer import make_optimizer
 from nrdf_benchmark.speed.plain_paper import PlainPaper
-from nrdf_benchmark.speed.training import training_shapes
+from nrdf_benchmark.speed.training import stage_datasets
 
 
 @dataclass(frozen=True)
@@ -50,24 +49,20 @@ def compare_steps(preset: str, threads: int, steps: int) -> list[StepComparison]
             f"there is a plain reading of the preset 'paper' alone; '{preset}' trains "
             f"'{config.preset}': give paper-short or paper"
         )
-    largest = max(stage.batch_size for stage in config.stages)
-    data = config.data.model_copy(update={"pools": {}})
-    dataset = ShapeDataset(training_shapes(largest), data, "cpu")
     field = build_field(config.preset, config.field)
     assert isinstance(field, PaperField)
     plain = PlainPaper(field, config.data.cloud_points)
     found = []
-    for number, stage in enumerate(config.stages):
+    for number, (stage, dataset) in enumerate(stage_datasets(config, torch.device("cpu"))):
         select_parts(field, stage)
         optimizer = make_optimizer(field, stage, config.optimizer)
         ours = Objective(field, stage, config, torch.bfloat16)
-        drawn = dataset.for_stage(stage.model_copy(update={"pools": None}))
         least = []
         for is_plain in (False, True):
             wall, cpu = [], []
             for step in range(steps + 1):
                 generator = seeded(torch.device("cpu"), number, step)
-                batch = drawn.batch(stage.batch_size, number, step)
+                batch = dataset.batch(stage.batch_size, number, step)
                 begun, used = time.perf_counter(), time.process_time()
                 if is_plain:
                     terms = plain.losses(batch, tuple(stage.weights), generator)

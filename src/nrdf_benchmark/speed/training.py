@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,12 @@ from nrdf.shapes.dataset import Shape
 from nrdf.shapes.families import get_family
 from nrdf.shapes.synth import member_shape
 from nrdf_benchmark.speed.common import CATEGORY, Stopwatch, device_memory, peak_memory
+
+if TYPE_CHECKING:
+    import torch
+
+    from nrdf.training.config import Stage, TrainConfig
+    from nrdf.training.dataset import ShapeDataset
 
 MAX_STAGE_S = 60.0
 """Seconds after which no further training steps of a stage are measured."""
@@ -37,20 +44,15 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
     from nrdf.field.device import choose_device, choose_precision
     from nrdf.training.batch import seeded
     from nrdf.training.config import load_config
-    from nrdf.training.dataset import ShapeDataset
     from nrdf.training.loop import Objective, select_parts
     from nrdf.training.optimizer import make_optimizer
 
     config = load_config(preset)
     chosen = choose_device(device)
-    largest = max(stage.batch_size for stage in config.stages)
-    dataset = ShapeDataset(
-        training_shapes(largest), config.data.model_copy(update={"pools": {}}), chosen
-    )
     precision = choose_precision(config.precision, chosen)
     field = build_field(config.preset, config.field).to(chosen)
     speeds = []
-    for number, stage in enumerate(config.stages):
+    for number, (stage, dataset) in enumerate(stage_datasets(config, chosen)):
         select_parts(field, stage)
         optimizer = make_optimizer(field, stage, config.optimizer)
         objective = Objective(field, stage, config, precision)
@@ -83,6 +85,17 @@ def measure_training(preset: str, device: str, steps: int) -> list[TrainingSpeed
             )
         )
     return speeds
+
+
+def stage_datasets(config: TrainConfig, device: torch.device) -> list[tuple[Stage, ShapeDataset]]:
+    """Each stage, and shapes to train it on as it draws them, but from one pool."""
+    from nrdf.training.dataset import ShapeDataset
+
+    largest = max(stage.batch_size for stage in config.stages)
+    data = config.data.model_copy(update={"pools": {}})
+    dataset = ShapeDataset(training_shapes(largest), data, device)
+    one_pool = [stage.model_copy(update={"pools": None}) for stage in config.stages]
+    return [(stage, dataset.for_stage(stage)) for stage in one_pool]
 
 
 def training_shapes(count: int) -> list[Shape]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import pytest
+import torch
 
 from nrdf.training.config import load_config
-from nrdf_benchmark.speed.training import measure_training
+from nrdf_benchmark.speed.training import measure_training, stage_datasets
 
 
 @pytest.fixture
@@ -29,3 +30,13 @@ def test_training_speed_counts_points(small_config):
         # A shape of each batch counts its encoder points, queries and one pair's correspondences.
         points = speed.batch_size * (128 + 64 + 32)
         assert speed.points_per_s * speed.step_s == pytest.approx(points, rel=0.1)
+
+
+def test_each_stage_draws_points_and_queries_of_its_own():
+    config = load_config("paper-short")
+    found = stage_datasets(config, torch.device("cpu"))
+    sizes = []
+    for stage, dataset in found[:2]:
+        batch = dataset.batch(stage.batch_size, 0, 0)
+        sizes.append((*batch.points.shape[:2], batch.queries.shape[1]))
+    assert sizes == [(16, 128, 256), (8, 1024, 512)]
