@@ -9,7 +9,7 @@ import torch
 
 from builders.tiny_field import Ball, balls, tiny_config, tiny_dataset, write_folder
 from nrdf.errors import ConfigError, DataError
-from nrdf.training.config import AugmentConfig
+from nrdf.training.config import AugmentConfig, Stage
 from nrdf.training.dataset import ShapeDataset, load_dataset
 from nrdf.training.pools import draw_shapes
 from nrdf.training.provenance import list_shapes
@@ -90,6 +90,33 @@ def test_both_shapes_of_a_pair_are_mirrored_alike():
         plain = tiny_dataset(augment=AugmentConfig()).batch(4, 0, step)
         signs.add(torch.allclose(plain.clean_points.mean(), batch.clean_points.mean(), atol=1e-3))
         assert batch.points.isfinite().all()
+
+
+def test_as_many_queries_are_inside_as_asked_for():
+    found = tiny_dataset(queries=2000, augment=AugmentConfig())
+    stored = found.occupancies.float().mean()
+    assert stored < 0.4
+    assert abs(found.batch(6, 0, 0).occupancy.mean() - stored) < 0.03
+    stage = Stage(name="any", weights={"occupancy": 1}, steps=1, inside=0.75)
+    own = found.for_stage(stage)
+    batch = own.batch(6, 0, 0)
+    assert (batch.occupancy.mean(1) - 0.75).abs().max() < 0.05
+    # Each is a stored one, with the answer that is stored.
+    chosen, _ = draw_shapes(own.pools, 6, 0, 0, 0, 1)
+    for row, shape in enumerate(chosen.tolist()):
+        for of, answer in ((True, 1.0), (False, 0.0)):
+            known = found.queries[shape][found.occupancies[shape] == of]
+            asked = batch.queries[row][batch.occupancy[row] == answer]
+            assert torch.cdist(asked, known).min(1).values.max() < 0.03
+    everything = own.plain()["*"].batch(6, 0, 0).occupancy.mean()
+    assert abs(everything - stored) < 0.05, "validation asks as they are stored"
+
+
+@pytest.mark.parametrize("answer", [False, True])
+def test_a_shape_that_is_all_inside_or_outside_is_asked_about_what_there_is(answer):
+    found = tiny_dataset(queries=50, inside=0.5)
+    found.occupancies[:] = answer
+    assert (found.batch(4, 0, 0).occupancy == float(answer)).all()
 
 
 def test_noise_touches_only_what_the_encoder_sees():

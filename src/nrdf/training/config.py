@@ -52,6 +52,8 @@ class DataConfig(StrictModel):
     encoder_points: int = Field(default=1024, ge=1)
     queries: int = Field(default=256, ge=0)
     """Occupancy queries a shape."""
+    inside: float | None = Field(default=None, ge=0, le=1)
+    """Share of the queries that is drawn from those inside the shape; None: as they are stored."""
     correspondences: int = Field(default=256, ge=0)
     """Corresponding points a pair."""
     rolls: int = Field(default=1, ge=1)
@@ -88,7 +90,9 @@ class Stage(StrictModel):
     """Shares of the sources in this stage's batches, instead of `data.pools`."""
     encoder_points: int | None = Field(default=None, ge=1)
     queries: int | None = Field(default=None, ge=0)
-    """Points and queries a shape in this stage, instead of those of `data`."""
+    inside: float | None = Field(default=None, ge=0, le=1)
+    """Points and queries a shape in this stage, and the share of these that is inside, instead of
+    those of `data`."""
     schedule: Literal["constant", "cosine"] = "constant"
     warmup: int = Field(default=0, ge=0)
     """Steps over which the rate rises linearly from zero."""

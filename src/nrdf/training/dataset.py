@@ -74,12 +74,12 @@ class ShapeDataset:
         return len(self.names)
 
     def for_stage(self, stage: Stage) -> ShapeDataset:
-        """The same shapes as a stage draws them: in its shares, as many points and queries.
+        """The same shapes as a stage draws them: in its shares, its points and queries.
 
         Raises ConfigError when its pools leave a shape out.
         """
         other = copy(self)
-        own = {"encoder_points": stage.encoder_points, "queries": stage.queries}
+        own = {name: getattr(stage, name) for name in ("encoder_points", "queries", "inside")}
         other.config = self.config.model_copy(
             update={name: value for name, value in own.items() if value is not None}
         )
@@ -90,7 +90,12 @@ class ShapeDataset:
     def plain(self) -> dict[str, ShapeDataset]:
         """By pool, the same shapes without deformation or noise; pools of one are left out."""
         config = self.config.model_copy(
-            update={"augment": AugmentConfig(), "rolls": 1, "correspondences": 256}
+            update={
+                "augment": AugmentConfig(),
+                "rolls": 1,
+                "correspondences": 256,
+                "inside": None,
+            }
         )
         found = {}
         for pool in self.pools:
@@ -143,12 +148,7 @@ class ShapeDataset:
         clean_points, clean_normals = deform.points(points), deform.normals(points, normals)
         points, normals = sensor_noise(config.augment, clean_points, clean_normals, generator)
 
-        pick = torch.randint(
-            self.queries.shape[1],
-            (len(chosen), config.queries),
-            generator=generator,
-            device=self.device,
-        )
+        pick = self._draw_queries(chosen, generator)
         undeformed = self.queries[chosen[:, None], pick]
         queries = deform.points(undeformed)
         occupancy = self.occupancies[chosen[:, None], pick].float()
@@ -180,6 +180,22 @@ class ShapeDataset:
             weight=places.weight,
             known=places.known,
         )
+
+    def _draw_queries(self, chosen: Tensor, generator: torch.Generator) -> Tensor:
+        """Which of their stored queries the chosen shapes (b,) are asked, (b, q)."""
+        share, size = self.config.inside, (len(chosen), self.config.queries)
+        if share is None:
+            stored = self.queries.shape[1]
+            return torch.randint(stored, size, generator=generator, device=self.device)
+        inside = self.occupancies[chosen]
+        count = inside.sum(1, keepdim=True)
+        rest = inside.shape[1] - count
+        # A shape with nothing inside (or outside) is asked about what there is.
+        share_inside = torch.where(count == 0, 0.0, torch.where(rest == 0, 1.0, share))
+        odds = torch.where(
+            inside, share_inside / count.clamp_min(1), (1.0 - share_inside) / rest.clamp_min(1)
+        )
+        return odds.multinomial(size[1], replacement=True, generator=generator)
 
 
 def _both(seen: Tensor, kept: Tensor) -> Tensor:
