@@ -112,9 +112,11 @@ def test_as_many_queries_are_inside_as_asked_for():
     assert abs(everything - stored) < 0.05, "validation asks as they are stored"
 
 
-@pytest.mark.parametrize("answer", [False, True])
-def test_a_shape_that_is_all_inside_or_outside_is_asked_about_what_there_is(answer):
-    found = tiny_dataset(queries=50, inside=0.5)
+@pytest.mark.parametrize(
+    ("answer", "share"), [(False, 0.5), (True, 0.5), (False, 1.0), (True, 0.0)]
+)
+def test_a_shape_that_is_all_inside_or_outside_is_asked_about_what_there_is(answer, share):
+    found = tiny_dataset(queries=50, inside=share)
     found.occupancies[:] = answer
     assert (found.batch(4, 0, 0).occupancy == float(answer)).all()
 

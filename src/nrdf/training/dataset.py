@@ -183,19 +183,15 @@ class ShapeDataset:
 
     def _draw_queries(self, chosen: Tensor, generator: torch.Generator) -> Tensor:
         """Which of their stored queries the chosen shapes (b,) are asked, (b, q)."""
-        share, size = self.config.inside, (len(chosen), self.config.queries)
+        share, wanted, stored = self.config.inside, self.config.queries, self.queries.shape[1]
         if share is None:
-            stored = self.queries.shape[1]
+            size = (len(chosen), wanted)
             return torch.randint(stored, size, generator=generator, device=self.device)
         inside = self.occupancies[chosen]
         count = inside.sum(1, keepdim=True)
-        rest = inside.shape[1] - count
-        # A shape with nothing inside (or outside) is asked about what there is.
-        share_inside = torch.where(count == 0, 0.0, torch.where(rest == 0, 1.0, share))
-        odds = torch.where(
-            inside, share_inside / count.clamp_min(1), (1.0 - share_inside) / rest.clamp_min(1)
-        )
-        return odds.multinomial(size[1], replacement=True, generator=generator)
+        odds = torch.where(inside, share / count, (1.0 - share) / (stored - count))
+        # Never all 0: a shape with nothing inside (or outside) is asked about what there is.
+        return odds.clamp_min(1e-12).multinomial(wanted, replacement=True, generator=generator)
 
 
 def _both(seen: Tensor, kept: Tensor) -> Tensor:
