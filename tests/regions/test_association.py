@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from builders.solids import box
-from nrdf.regions.association import nearest_voters, snap
+from nrdf.field.encoded_cloud import EncodedCloud
+from nrdf.geometry.similarity import Similarity
+from nrdf.io.cloud import PointCloud
+from nrdf.regions.association import alike_voters, nearest_voters, snap
+from nrdf.regions.mapping import MappedPoints
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +69,70 @@ def test_normals_tell_the_two_sides_of_a_thin_plate_apart():
 
     assert min(agreement(0.1)) > 0.98
     assert max(agreement(0.0)) < 0.8
+
+
+def encoded(points, normals):
+    pose = Similarity(np.eye(3), np.zeros(3), 1.0)
+    cloud = PointCloud(points, normals)
+    return EncodedCloud(cloud, np.arange(len(points)), points, normals, pose, torch.zeros(1, 1))
+
+
+@pytest.fixture(scope="module")
+def leg_and_rail():
+    """A reference of a leg that stands (1500 points) and a rail that lies (1500)."""
+    leg, leg_normals = box((0.04, 0.5, 0.04), 1500)
+    rail, rail_normals = box((0.04, 0.04, 0.5), 1500, seed=1, centre=(0.4, 0.0, 0.0))
+    return encoded(np.concatenate([leg, rail]), np.concatenate([leg_normals, rail_normals]))
+
+
+@pytest.fixture(scope="module")
+def leg():
+    return encoded(*box((0.04, 0.5, 0.04), 1200, seed=2))
+
+
+def arrived(reference, error):
+    """The rail where the target's leg is, the leg beside it."""
+    count = len(reference.points)
+    moved = reference.points - np.where(np.arange(count) < 1500, 0.08, 0.4)[:, None] * [1, 0, 0]
+    expected = np.full(count, error)
+    return MappedPoints(moved, reference.normals, np.ones(count), expected, np.zeros((count, 3)))
+
+
+def share_of_leg(index, target):
+    """Of the votes where leg and rail cross, on the sides that both have."""
+    crossing = (np.abs(target.points[:, 1]) < 0.02) & (np.abs(target.normals[:, 0]) > 0.5)
+    return (index[crossing] < 1500).mean()
+
+
+def test_a_leg_is_voted_for_by_a_leg(leg_and_rail, leg):
+    mapped = arrived(leg_and_rail, 0.05)
+    nearest, _ = nearest_voters(mapped.points, mapped.normals, leg.points, leg.normals)
+    alike, _ = alike_voters(mapped, leg_and_rail.local_shapes, leg)
+    assert share_of_leg(nearest, leg) < 0.05
+    assert share_of_leg(alike, leg) > 0.8
+
+
+def test_where_the_map_is_exact_places_decide(leg_and_rail, leg):
+    index, _ = alike_voters(arrived(leg_and_rail, 0.001), leg_and_rail.local_shapes, leg)
+    assert share_of_leg(index, leg) < 0.05
+
+
+def test_where_no_error_is_predicted_local_shapes_count(leg_and_rail, leg):
+    index, _ = alike_voters(arrived(leg_and_rail, 0.0), leg_and_rail.local_shapes, leg)
+    expected, _ = alike_voters(arrived(leg_and_rail, 0.025), leg_and_rail.local_shapes, leg)
+    np.testing.assert_array_equal(index, expected)
+
+
+def test_distances_of_alike_voters_are_in_position_and_normal(leg_and_rail, leg):
+    mapped = arrived(leg_and_rail, 0.05)
+    index, distance = alike_voters(mapped, leg_and_rail.local_shapes, leg)
+    assert index.shape == distance.shape == (1200, 7)
+    clouds = mapped.points, mapped.normals, leg.points, leg.normals
+    expected = all_distances(*clouds, 0.1).T[np.arange(1200)[:, None], index]
+    np.testing.assert_allclose(distance, expected, atol=1e-12)
+
+
+def test_no_more_alike_voters_than_there_are(leg):
+    few = encoded(*box((0.2, 0.2, 0.2), 4))
+    index, _ = alike_voters(arrived(few, 0.05), few.local_shapes, leg)
+    assert (np.sort(index, axis=1) == np.arange(4)).all()

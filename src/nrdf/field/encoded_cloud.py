@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
+from nrdf.geometry.local_shape import local_shapes
 from nrdf.geometry.normals import oriented_features, oriented_tree
 from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.geometry.similarity import Similarity
@@ -107,6 +108,12 @@ class EncodedCloud:
         features = oriented_features(points, normals, NORMAL_WEIGHT)
         wanted = np.arange(1, min(count, len(self.points)) + 1)
         return np.asarray(self._oriented_tree.query(features, k=wanted)[1])
+
+    @cached_property
+    def local_shapes(self) -> np.ndarray:
+        """How the surface lies around the working points, (n, 12)
+        (`nrdf.geometry.local_shape`)."""
+        return local_shapes(self.points, self.normals)
 
     @cached_property
     def _oriented_tree(self) -> cKDTree:

@@ -77,9 +77,13 @@ def oriented_features(points: np.ndarray, normals: np.ndarray, weight: float) ->
 
 
 def oriented_tree(points: np.ndarray, normals: np.ndarray, weight: float) -> cKDTree:
-    """A tree of `oriented_features`. Its leaves are large and its boxes are not shrunk: in six
+    """A tree of `oriented_features`."""
+    return search_tree(oriented_features(points, normals, weight))
+
+
+def search_tree(features: np.ndarray) -> cKDTree:
+    """A tree of features (n, d). Its leaves are large and its boxes are not shrunk: in six
     dimensions searches then take a quarter less time, with the same results."""
-    features = oriented_features(points, normals, weight)
     return cKDTree(features, _LEAF, compact_nodes=False, balanced_tree=False)
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from nrdf.field.encoded_cloud import NORMAL_WEIGHT
-from nrdf.geometry.normals import oriented_features, oriented_tree
+from nrdf.field.encoded_cloud import NORMAL_WEIGHT, EncodedCloud
+from nrdf.geometry.normals import oriented_features, oriented_tree, search_tree
+from nrdf.regions.mapping import MappedPoints
 
 VOTING_NEIGHBOURS = 7
 """Reference points on the target that vote on each target point (k-nearest voting)."""
 
+# Canonical length that one unit of difference in local shape counts for: a multiple of the error
+# that is expected of the map, and what it is where nothing predicts one. Where a map is exact its
+# places decide; the less it can be believed, the more a leg's points come from a leg.
+_SHAPE_PER_ERROR = 2.0
+_SHAPE_WEIGHT = 0.05
 
 # Trees are queried by one thread: an interrupt would free the arrays under scipy's other threads.
 
@@ -50,3 +56,24 @@ def nearest_voters(
         k=np.arange(1, min(count, len(mapped)) + 1),
     )
     return index, distance
+
+
+def alike_voters(
+    mapped: MappedPoints, shapes: np.ndarray, target: EncodedCloud
+) -> tuple[np.ndarray, np.ndarray]:
+    """The mapped reference points that vote on each target point: nearest in position, normal and
+    local shape.
+
+    shapes: (m, 12) of the reference's points, on the reference (`EncodedCloud.local_shapes`).
+    Returns the voters' indices (n, `VOTING_NEIGHBOURS`) and distances, in position and normal.
+    """
+    expected = float(mapped.error.mean())
+    weight = _SHAPE_PER_ERROR * expected if expected > 0.0 else _SHAPE_WEIGHT
+    place = oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
+    wanted = oriented_features(target.points, target.normals, NORMAL_WEIGHT)
+    tree = search_tree(np.concatenate([place, weight * shapes], axis=1))
+    index = tree.query(
+        np.concatenate([wanted, weight * target.local_shapes], axis=1),
+        k=np.arange(1, min(VOTING_NEIGHBOURS, len(place)) + 1),
+    )[1]
+    return index, np.linalg.norm(place[index] - wanted[:, None], axis=2)

@@ -18,7 +18,7 @@ from nrdf.field.general import GENERAL
 from nrdf.field.registration import REGISTRATION
 from nrdf.geometry.normals import oriented_features
 from nrdf.io.inputs import as_cloud
-from nrdf.regions.association import VOTING_NEIGHBOURS, nearest_voters, snap
+from nrdf.regions.association import VOTING_NEIGHBOURS, alike_voters, nearest_voters, snap
 from nrdf.regions.field_mapper import FieldMapper
 from nrdf.regions.mapping import TRUST_SCALE, MappedPoints, SurfaceMapper
 from nrdf.regions.match import Match
@@ -97,9 +97,9 @@ class EncodedReference:
             target: what `nrdf.as_cloud` takes (a path, an array (n, 3), a mesh, …), or encoded.
                 Matches index its points; `nrdf.as_cloud` gives those that a mesh is sampled to.
             method: "mask" maps the whole reference. Each target point joins a region by the
-                votes of the mapped reference points nearest in position and normal (k-nearest
-                voting). Parts of the target that are far from all of them, by the error that the
-                field expects, join a region only where they grow out of it
+                votes of the mapped reference points nearest in position, normal and local shape
+                (k-nearest voting). Parts of the target that are far from all of them, by the error
+                that the field expects, join a region only where they grow out of it
                 (`nrdf.regions.patches`). "points" snaps C's prediction of each region point to the
                 target (paper, eq. 9). A region of fewer than half of `VOTING_NEIGHBOURS` points
                 gets no majority anywhere: use "points" for spots.
@@ -263,12 +263,14 @@ class EncodedReference:
     def _by_mask(
         self, chosen: dict[str, np.ndarray], target: EncodedCloud, mapped: MappedPoints
     ) -> dict[str, Match]:
-        """Each target point joins a region by the votes of its nearest mapped reference points."""
-        voters, distance = nearest_voters(
+        """Each target point joins a region by the votes of the mapped reference points that are
+        nearest and lie alike; what has none near it joins where it grows out of the region."""
+        nearest, distance = nearest_voters(
             mapped.points, mapped.normals, target.points, target.normals
         )
+        patches = find_patches(target.points, explained_by(distance, mapped.error[nearest]))
+        voters, distance = alike_voters(mapped, self.encoded_cloud.local_shapes, target)
         trust = mapped.trust[voters] * np.exp(-distance / TRUST_SCALE)
-        patches = find_patches(target.points, explained_by(distance, mapped.error[voters]))
         matches = {}
         for name, indices in chosen.items():
             member = self._working_mask(indices)[voters]
