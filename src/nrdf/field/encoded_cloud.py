@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from scipy.spatial import cKDTree
 
-from nrdf.geometry.local_shape import local_shapes
+from nrdf.geometry.local_shape import local_shapes, telling_directions
 from nrdf.geometry.normals import oriented_features, oriented_tree
 from nrdf.geometry.sampling import downsample, indices_in_subset
 from nrdf.geometry.similarity import Similarity
@@ -111,9 +111,19 @@ class EncodedCloud:
 
     @cached_property
     def local_shapes(self) -> np.ndarray:
-        """How the surface lies around the working points, (n, 12)
-        (`nrdf.geometry.local_shape`)."""
+        """How the surface lies around the working points, (n, 12) (`nrdf.geometry.local_shape`)."""
         return local_shapes(self.points, self.normals)
+
+    def alike_features(self, other: EncodedCloud) -> tuple[np.ndarray, np.ndarray]:
+        """What tells which points of another cloud lie as those of this one do: features (n, 3) of
+        the working points and (m, 3) of the other's, whose distances are those of local shapes, as
+        far as this cloud's own differ."""
+        directions = self._telling_directions
+        return self.local_shapes @ directions, other.local_shapes @ directions
+
+    @cached_property
+    def _telling_directions(self) -> np.ndarray:
+        return telling_directions(self.local_shapes)
 
     @cached_property
     def _oriented_tree(self) -> cKDTree:

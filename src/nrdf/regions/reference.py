@@ -268,24 +268,22 @@ class EncodedReference:
         nearest, distance = nearest_voters(
             mapped.points, mapped.normals, target.points, target.normals
         )
+        trust = (mapped.trust[nearest] * np.exp(-distance / TRUST_SCALE)).mean(axis=1)
         patches = find_patches(target.points, explained_by(distance, mapped.error[nearest]))
-        voters, distance = alike_voters(mapped, self.encoded_cloud.local_shapes, target)
-        trust = mapped.trust[voters] * np.exp(-distance / TRUST_SCALE)
+        voters = alike_voters(mapped, self.encoded_cloud, target)
         matches = {}
         for name, indices in chosen.items():
-            member = self._working_mask(indices)[voters]
-            votes = member.mean(axis=1)
-            confidence = (member * trust).sum(axis=1) / np.maximum(member.sum(axis=1), 1)
+            votes = self._working_mask(indices)[voters].mean(axis=1)
             voted = votes > 0.5
             found = patches.joined(voted)
             # Where much was voted in that nothing on the reference explains, trust the rest less.
-            confidence *= found.sum() / max(voted.sum(), 1)
+            confidence = votes * trust * (found.sum() / max(voted.sum(), 1))
             index, follows = target.to_all(found)
             points = self.map_points(indices, target, mapped).points
             matches[name] = Match(
                 indices=index,
                 points=target.original(points),
-                confidence=np.clip(votes * confidence, 0.0, 1.0)[follows],
+                confidence=np.clip(confidence, 0.0, 1.0)[follows],
                 method="mask",
                 working=np.flatnonzero(found),
             )

@@ -48,8 +48,8 @@ class Registration:
     """Where a template's points arrive on a target.
 
     points: (n, 3) mapped template points, smooth, near the target's surface.
-    target_index: (n,) nearest target point in (position, normal).
-    distance: (n,) distance to it in (position, weighted normal).
+    target_index: (n,) nearest target point in (position, normal, what is alike).
+    distance: (n,) distance to it in (position, weighted normal, what is alike).
     back: (m,) distance of each target point from the nearest of `points`, likewise.
     """
 
@@ -77,12 +77,17 @@ class RegistrationTemplate:
         self._kernels = [np.exp(squared * (-2.0 / r**2)) for r in self.settings.radii().tolist()]
 
     def register(
-        self, target_points: Array, target_normals: Array, start: tuple[Array, Array] | None = None
+        self,
+        target_points: Array,
+        target_normals: Array,
+        start: tuple[Array, Array] | None = None,
+        alike: tuple[Array, Array] | None = None,
     ) -> Registration:
         """Move the template onto a target given by points (m, 3) and unit normals (m, 3).
 
         `start`: points and unit normals (n, 3) from which to begin, where something better than
-        the bounding box is known.
+        the bounding box is known. `alike`: features (n, a) of the template and (m, a) of the
+        target, as lengths, in which neighbours are near as well.
         """
         s = self.settings
         target = np.asarray(target_points, np.float32)
@@ -95,7 +100,7 @@ class RegistrationTemplate:
         balance = len(base) / len(target)
         for kernel, normal_weight in zip(self._kernels, s.normal_weights(), strict=True):
             to_target, target_index, to_moved, moved_index = _match(
-                moved, own, target, normals, float(normal_weight)
+                moved, own, target, normals, float(normal_weight), alike
             )
             forward = np.exp(-((to_target / s.match_scale) ** 2)).astype(np.float32)
             backward = balance * np.exp(-((to_moved / s.match_scale) ** 2)).astype(np.float32)
@@ -109,7 +114,7 @@ class RegistrationTemplate:
                 sums[:, column] += np.bincount(moved_index, pulled[:, column], len(base))
             smooth = kernel @ sums
             moved = base + smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-6)
-        distance, index, back, _ = _match(moved, own, target, normals, s.normal_weight_end)
+        distance, index, back, _ = _match(moved, own, target, normals, s.normal_weight_end, alike)
         return Registration(moved.astype(np.float32), index, distance, back)
 
     def _from_box(self, target: Array) -> Array:
@@ -140,11 +145,20 @@ class DisplacementInterpolator:
 
 
 def _match(
-    moved: Array, own: Array, target: Array, normals: Array, normal_weight: float
+    moved: Array,
+    own: Array,
+    target: Array,
+    normals: Array,
+    normal_weight: float,
+    alike: tuple[Array, Array] | None,
 ) -> tuple[Array, Array, Array, Array]:
-    """Nearest neighbours both ways in (position, weighted normal): distances and indices."""
+    """Nearest neighbours both ways in (position, weighted normal, what is `alike`): distances and
+    indices."""
     moved_features = oriented_features(moved, own, normal_weight)
     target_features = oriented_features(target, normals, normal_weight)
+    if alike is not None:
+        moved_features = np.concatenate([moved_features, alike[0]], axis=1, dtype=np.float32)
+        target_features = np.concatenate([target_features, alike[1]], axis=1, dtype=np.float32)
     if len(moved) * len(target) <= _ALL_COMPARED:
         return _match_all(moved_features, target_features)
     to_target, target_index = cKDTree(target_features).query(moved_features)
@@ -153,14 +167,14 @@ def _match(
 
 
 def _match_all(one: Array, two: Array) -> tuple[Array, Array, Array, Array]:
-    """As of `_match`, of features (n, 6) and (m, 6), by comparing all with all."""
+    """As of `_match`, of features (n, f) and (m, f), by comparing all with all."""
     index, back = _nearest_of_all(one, two), _nearest_of_all(two, one)
     there, here = one - two[index], two - one[back]
     return np.sqrt((there**2).sum(1)), index, np.sqrt((here**2).sum(1)), back
 
 
 def _nearest_of_all(one: Array, two: Array) -> Array:
-    """For each of (n, 6) the nearest of (m, 6): that of the least |b|² - 2ab, one product."""
+    """For each of (n, f) the nearest of (m, f): that of the least |b|² - 2ab, one product."""
     left = np.concatenate([one, np.ones((len(one), 1), one.dtype)], 1)
     right = np.concatenate([-2 * two, (two**2).sum(1, keepdims=True)], 1)
     return np.asarray((left @ right.T).argmin(1))
