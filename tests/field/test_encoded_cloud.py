@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from builders.encoded import as_encoded
+from builders.solids import box
 from nrdf.field.encoded_cloud import EncodedCloud, encoder_subset
 from nrdf.geometry.canonical import rotation_about_up
 from nrdf.geometry.normals import oriented_features
@@ -53,3 +55,16 @@ def test_the_encoder_sees_the_extreme_points():
     chosen = encoder_subset(points, 100)
     assert 100 <= len(chosen) <= 106 and len(np.unique(chosen)) == len(chosen)
     np.testing.assert_array_equal(np.ptp(points[chosen], axis=0), np.ptp(points, axis=0))
+
+
+def test_alike_features_tell_a_leg_from_a_rail_whichever_cloud_it_is_on():
+    def encode(*sizes):
+        clouds = [box(size, 800, seed=i, centre=(0.4 * i, 0, 0)) for i, size in enumerate(sizes)]
+        return as_encoded(*(np.concatenate(both) for both in zip(*clouds, strict=True)))
+
+    leg, rail = (0.04, 0.6, 0.04), (0.04, 0.04, 0.6)
+    own, others = encode(leg, rail).alike_features(encode(rail, leg))
+    assert own.shape == others.shape == (1600, 3)
+    means = [features.reshape(2, 800, 3).mean(axis=1) for features in (own, others)]
+    assert np.linalg.norm(means[0] - means[1][::-1], axis=1).max() < 0.1
+    assert np.linalg.norm(means[0] - means[1], axis=1).min() > 0.6

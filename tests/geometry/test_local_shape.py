@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from builders.solids import box
-from nrdf.geometry.local_shape import local_shapes
+from nrdf.geometry.local_shape import local_shapes, telling_directions
 from nrdf.geometry.sampling import fibonacci_directions
 
 
@@ -68,3 +68,12 @@ def test_points_far_apart_are_on_their_own():
     expected = np.zeros((3, 12))
     expected[:, :3] = np.eye(3)
     np.testing.assert_allclose(shapes, expected, atol=1e-12)
+
+
+def test_the_telling_directions_keep_most_of_what_differs():
+    rng = np.random.default_rng(0)
+    basis = np.linalg.qr(rng.normal(size=(12, 12)))[0]
+    shapes = rng.normal(size=(500, 12)) * [3.0, 2.0, 1.5, *[0.1] * 9] @ basis.T + 5.0
+    directions = telling_directions(shapes)
+    np.testing.assert_allclose(directions.T @ directions, np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(np.abs(np.diag(directions.T @ basis[:, :3])), 1.0, atol=0.01)

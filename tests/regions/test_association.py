@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 
+from builders.encoded import as_encoded
 from builders.solids import box
-from nrdf.field.encoded_cloud import EncodedCloud
-from nrdf.geometry.similarity import Similarity
-from nrdf.io.cloud import PointCloud
 from nrdf.regions.association import alike_voters, nearest_voters, snap
 from nrdf.regions.mapping import MappedPoints
 
@@ -71,23 +68,17 @@ def test_normals_tell_the_two_sides_of_a_thin_plate_apart():
     assert max(agreement(0.0)) < 0.8
 
 
-def encoded(points, normals):
-    pose = Similarity(np.eye(3), np.zeros(3), 1.0)
-    cloud = PointCloud(points, normals)
-    return EncodedCloud(cloud, np.arange(len(points)), points, normals, pose, torch.zeros(1, 1))
-
-
 @pytest.fixture(scope="module")
 def leg_and_rail():
     """A reference of a leg that stands (1500 points) and a rail that lies (1500)."""
     leg, leg_normals = box((0.04, 0.5, 0.04), 1500)
     rail, rail_normals = box((0.04, 0.04, 0.5), 1500, seed=1, centre=(0.4, 0.0, 0.0))
-    return encoded(np.concatenate([leg, rail]), np.concatenate([leg_normals, rail_normals]))
+    return as_encoded(np.concatenate([leg, rail]), np.concatenate([leg_normals, rail_normals]))
 
 
 @pytest.fixture(scope="module")
 def leg():
-    return encoded(*box((0.04, 0.5, 0.04), 1200, seed=2))
+    return as_encoded(*box((0.04, 0.5, 0.04), 1200, seed=2))
 
 
 def arrived(reference, error):
@@ -124,6 +115,6 @@ def test_where_no_error_is_predicted_local_shapes_count(leg_and_rail, leg):
 
 
 def test_no_more_alike_voters_than_there_are(leg):
-    few = encoded(*box((0.2, 0.2, 0.2), 4))
+    few = as_encoded(*box((0.2, 0.2, 0.2), 4))
     index = alike_voters(arrived(few, 0.05), few, leg)
     assert (np.sort(index, axis=1) == np.arange(4)).all()

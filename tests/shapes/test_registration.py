@@ -140,3 +140,17 @@ def test_small_clouds_are_matched_as_trees_would(monkeypatch):
     for values, expected in zip(vars(found).values(), vars(by_trees).values(), strict=True):
         np.testing.assert_allclose(values, expected, atol=1e-3)
     assert found.back.shape == (300,)
+
+
+def test_what_is_alike_is_matched_where_places_mislead():
+    """Two parallel sheets; the target's lie the other way round, and a feature tells which."""
+    sheet = np.random.default_rng(0).uniform(-0.5, 0.5, (300, 3)) * [1, 0, 1]
+    points = np.concatenate([sheet, sheet + np.array([0.0, 0.1, 0.0])])
+    normals = np.tile([0.0, 1.0, 0.0], (600, 1))
+    which = np.repeat([0.0, 1.0], 300)[:, None]
+    target = points * [1, -1, 1] + [0.0, 0.1, 0.0]
+    template = RegistrationTemplate(points, normals, SETTINGS)
+    by_place = template.register(target, normals).target_index
+    by_kind = template.register(target, normals, alike=(which, which)).target_index
+    assert (which[by_place] == which).mean() < 0.5
+    assert (which[by_kind] == which).all()
