@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib.figure
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from nrdf.geometry.mesh import Mesh
 from nrdf.io.cloud import PointCloud
 from nrdf.shapes.dataset import read_shape
-from nrdf.viz.picture import Panel, render_panels, write_figure
+from nrdf.viz.picture import Panel, render_panels
+from nrdf.viz.sheet import Sheet
 from nrdf_benchmark.methods.registry import MethodSpec
 from nrdf_benchmark.shape import Settings, level_set, model_of
 
 COLUMNS = 6
-_DPI = 100
 _LABEL = 26  # pixels above each row
 
 
@@ -48,18 +46,11 @@ def draw_surfaces(
     labels = ["given", *(f"{spec.name}, occupancy {settings.level:g}" for spec in specs)]
     tall = max(image.shape[0] for image in images if image is not None) + _LABEL
     width, height = size * len(shapes), tall * len(labels)
-    figure = matplotlib.figure.Figure((width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
-    FigureCanvasAgg(figure)
+    sheet = Sheet(width, height)
     for number, image in enumerate(images):
         row, column = divmod(number, len(shapes))
         if image is not None:
-            top = height - row * tall - _LABEL
-            figure.figimage(
-                (image * 255).astype(np.uint8), xo=column * size, yo=top - image.shape[0]
-            )
+            sheet.paste(image, column * size, row * tall + _LABEL)
     for row, label in enumerate(labels):
-        figure.text(
-            10 / width, 1 - (row * tall + 8) / height, label, size=12, weight="bold", va="top",
-            color="#222",
-        )  # fmt: skip
-    write_figure(figure, path, _DPI)
+        sheet.write(label, 10, row * tall + 8, 17, bold=True, anchor="la")
+    sheet.save(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,6 +10,7 @@ from tyro.conf import Positional
 
 from nrdf.commands.console import console, errors
 from nrdf.commands.options import File, Metavar
+from nrdf.io.atomic import write_atomically
 from nrdf.io.bounds import Positive
 
 if TYPE_CHECKING:
@@ -97,8 +99,6 @@ def draw_strip(path: Path, strip: Strip, fitted: FittedProfile) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from nrdf.viz.picture import write_figure
-
     figure = Figure((7.0, 4.0), dpi=100, facecolor="white", layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -116,4 +116,6 @@ def draw_strip(path: Path, strip: Strip, fitted: FittedProfile) -> None:
     axes.set_ylim(bottom=0.0)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
-    write_figure(figure, path, 100)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format=path.suffix.removeprefix(".") or "png")
+    write_atomically(path, [drawn.getbuffer()])

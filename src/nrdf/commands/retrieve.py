@@ -130,10 +130,14 @@ def retrieve(
             warn_of(warnings, target)
         matches = encoded.retrieve_all(regions, encoded_target, method, refine, check=False)
         clock.lap("target and regions")
-        title = f"{reference.name} (reference)"
+        taught = {
+            name: encoded.encoded_cloud.to_working(indices)
+            for name, indices in reference_indices(regions, reference_cloud).items()
+        }
+        found = {name: match.working for name, match in matches.items()}
         panels = [
-            region_panel(title, reference_cloud, reference_indices(regions, reference_cloud)),
-            target_panel(target.name, encoded_target, {n: m.working for n, m in matches.items()}),
+            encoded_panel(f"{reference.name} (reference)", encoded.encoded_cloud, taught),
+            encoded_panel(target.name, encoded_target, found),
         ]
         if scan is not None:
             matches = {name: match.in_scan(scan) for name, match in matches.items()}
@@ -188,15 +192,7 @@ def reference_indices(
     return {name: whole_region(values, reference) for name, values in regions.items()}
 
 
-def region_panel(
-    title: str, cloud: PointCloud, regions: Mapping[str, np.ndarray], note: str = ""
-) -> Panel:
-    from nrdf.viz.picture import Panel
-
-    return Panel(title, cloud.points, cloud.normals, dict(regions), note)
-
-
-def target_panel(title: str, encoded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
+def encoded_panel(title: str, encoded: EncodedCloud, regions: Mapping[str, np.ndarray]) -> Panel:
     """An encoded cloud in the category's frame, with regions as indices of its working points."""
     from nrdf.viz.picture import Panel
 

@@ -53,7 +53,7 @@ class PresenceRule:
 # of labelled real objects and on members of families, whole and in scans of three views: what
 # `nrdf eval presence` prints (docs/evidence/scans.md). The field's holds for the general model as
 # well, which it was not fitted on: one that was is no better (docs/evidence/general.md).
-FIELD_RULE = PresenceRule(-0.98, Evidence(existence=0.17, trust=0.77, size=0.71, returned=0.48))
+FIELD_RULE = PresenceRule(-0.81, Evidence(existence=0.23, trust=0.68, size=0.97, returned=0.43))
 REGISTRATION_RULE = PresenceRule(
     0.39, Evidence(existence=0.35, trust=1.09, size=2.29, returned=-0.05)
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from nrdf.reports.result_report import feed_in_words, histogram, result_lines
 from nrdf.reports.transfer_report import METRIC_COLUMNS, left_out_in_words, metric_cells
 from nrdf.viz.heat_map import HeatMap
 from nrdf.viz.palette import region_colours
+from nrdf.viz.sheet import png_of
 
 
 def write_html(path: Path, template: str, content: Mapping[str, Any]) -> None:
@@ -94,17 +94,13 @@ def _templates() -> Environment:
     )
 
 
-def _data_source(content: bytes, kind: str) -> str:
+def _data_source(content: bytes | memoryview, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _png_source(image: np.ndarray) -> str:
     """A picture (h, w, 3) in [0, 1] as the source of an <img>."""
-    from matplotlib.image import imsave
-
-    file = io.BytesIO()
-    imsave(file, (255 * image).astype(np.uint8), format="png")
-    return _data_source(file.getvalue(), "png")
+    return _data_source(png_of(image), "png")
 
 
 def _results(

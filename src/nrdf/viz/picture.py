@@ -9,14 +9,12 @@ A mesh with its regions and tool paths:
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -25,14 +23,11 @@ from nrdf.geometry.canonical import canonical_transform
 from nrdf.geometry.mesh import Mesh
 from nrdf.geometry.normals import estimate_normals
 from nrdf.geometry.sampling import downsample
-from nrdf.io.atomic import write_atomically
 from nrdf.viz.mesh_render import MeshScene, Triangles
 from nrdf.viz.palette import DEEP, NO_REGION, PALE, region_colours
 from nrdf.viz.render import Scene, SurfaceLines
+from nrdf.viz.sheet import GREY, Sheet, legend_height
 from nrdf.viz.view import FRONT, Camera
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _MAX_POINTS = 20_000
 _MARGIN = 0.05  # canonical, around each object
@@ -266,49 +261,18 @@ def _compose(
     size: int,
 ) -> None:
     """Panels with their titles above and the legend below, written to `path`."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    dpi = 100
     header = 62 if any(panel.note for panel in panels) else 40
-    footer = 50 if colours else 10
     width = size * len(rows[0])
-    height = header + footer + sum(row[0].shape[0] for row in rows)
-    figure = Figure((width / dpi, height / dpi), dpi=dpi, facecolor="white")
-    FigureCanvasAgg(figure)
-    top = height - header
+    footer = 24 + legend_height(colours, width) if colours else 10
+    sheet = Sheet(width, header + footer + sum(row[0].shape[0] for row in rows))
     for i, panel in enumerate(panels):
-        x = (i + 0.5) / len(panels)
-        text: dict[str, Any] = {"ha": "center", "va": "top", "family": "DejaVu Sans"}
-        figure.text(x, 1 - 12 / height, panel.title, size=13, weight="bold", color="#222", **text)
-        figure.text(x, 1 - 38 / height, panel.note, size=10.5, color="#666", **text)
+        x = (i + 0.5) * width / len(panels)
+        sheet.write(panel.title, x, 12, 18, bold=True)
+        sheet.write(panel.note, x, 38, 14.5, GREY)
+    top = header
     for row in rows:
-        top -= row[0].shape[0]
         for i, image in enumerate(row):
-            figure.figimage((image * 255).astype(np.uint8), xo=i * size, yo=top)
-    add_legend(figure, colours)
-    write_figure(figure, path, dpi)
-
-
-def add_legend(figure: Figure, colours: Mapping[str, np.ndarray]) -> None:
-    """Each region's name beside its colour, along the lower edge of a matplotlib figure."""
-    from matplotlib.patches import Patch
-
-    if colours:
-        figure.legend(
-            handles=[Patch(color=tuple(colour), label=name) for name, colour in colours.items()],
-            loc="lower center",
-            ncols=max(1, min(len(colours), int(figure.get_figwidth() / 1.5))),
-            frameon=False,
-            fontsize=11.5,
-            handlelength=1.1,
-            handleheight=1.1,
-        )
-
-
-def write_figure(figure: Figure, path: Path, dpi: int) -> None:
-    """Write a matplotlib figure, whole or not at all. Raises OutputError if it cannot be."""
-    drawn = io.BytesIO()
-    ending = path.suffix.removeprefix(".") or "png"
-    figure.savefig(drawn, format=ending, dpi=dpi, pil_kwargs={"compress_level": 4})
-    write_atomically(path, [drawn.getbuffer()])
+            sheet.paste(image, i * size, top)
+        top += row[0].shape[0]
+    sheet.add_legend(colours)
+    sheet.save(path)

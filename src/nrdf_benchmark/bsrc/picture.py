@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from nrdf.viz.picture import Panel, add_legend, render_panels, write_figure
+from nrdf.viz.picture import Panel, render_panels
+from nrdf.viz.sheet import GREY, Sheet, legend_height
 from nrdf_benchmark.bsrc.dataset import Benchmark
 from nrdf_benchmark.methods.registry import Method
 from nrdf_benchmark.metrics import chamfer_l1
 
 TARGETS = 4
-_DPI = 100
-_HEADER, _FOOTER, _LABELS = 84, 50, 40  # pixels
-_TEXT: dict[str, Any] = {"ha": "center", "family": "DejaVu Sans"}
+_HEADER, _LABELS = 84, 40  # pixels
 
 
 def draw_comparison(
@@ -60,37 +58,25 @@ def _compose(
     path: Path,
 ) -> None:
     """Each view as two lines of targets, with the reference half-way between them."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     heights = [view[0].shape[0] for view in views]
     size, columns = views[0][0].shape[1], len(panels)
     width = columns * size + _LABELS
-    height = _HEADER + _FOOTER + 2 * sum(heights)
-    figure = Figure((width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-
-    def put(image: np.ndarray, x: int, top: int) -> None:
-        figure.figimage((image * 255).astype(np.uint8), xo=x, yo=top - image.shape[0])
-
-    def write(text: str, x: float, y: float, **style: Any) -> None:
-        figure.text(x / width, y / height, text, **_TEXT, **style)
-
-    write(title, width / 2, height - 26, size=14, weight="bold", color="#222")
+    footer = 24 + legend_height(colours, width)
+    sheet = Sheet(width, _HEADER + footer + 2 * sum(heights))
+    sheet.write(title, width / 2, 10, 19, bold=True)
     heads = ["reference", *notes]
     for column, (panel, note) in enumerate(zip(panels, heads, strict=True)):
         x = column * size + size / 2 + (_LABELS if column else 0)
-        write(panel.title, x, height - 54, size=12, weight="bold", color="#222")
-        write(note, x, height - 74, size=10.5, color="#666")
-    top = height - _HEADER
+        sheet.write(panel.title, x, 40, 17, bold=True)
+        sheet.write(note, x, 62, 14.5, GREY)
+    top = _HEADER
     for view, tall in zip(views, heights, strict=True):
-        put(view[0], 0, top - tall // 2)
+        sheet.paste(view[0], 0, top + tall // 2)
         for line, label in enumerate(("retrieved", "true")):
             for column in range(1, columns):
                 image = view[column + line * (columns - 1)]
-                put(image, _LABELS + column * size, top - line * tall)
-            style = {"rotation": 90, "va": "center", "size": 12, "color": "#444"}
-            write(label, size + _LABELS / 2, top - (line + 0.5) * tall, **style)
-        top -= 2 * tall
-    add_legend(figure, colours)
-    write_figure(figure, path, _DPI)
+                sheet.paste(image, _LABELS + column * size, top + line * tall)
+            sheet.write_upwards(label, size + _LABELS // 2, int(top + (line + 0.5) * tall), 17)
+        top += 2 * tall
+    sheet.add_legend(colours)
+    sheet.save(path)
