@@ -98,23 +98,32 @@ def share_of_leg(index, target):
 def test_a_leg_is_voted_for_by_a_leg(leg_and_rail, leg):
     mapped = arrived(leg_and_rail, 0.05)
     nearest, _ = nearest_voters(mapped.points, mapped.normals, leg.points, leg.normals)
-    alike = alike_voters(mapped, leg_and_rail, leg)
+    alike, _ = alike_voters(mapped, leg_and_rail, leg)
     assert share_of_leg(nearest, leg) < 0.05
     assert share_of_leg(alike, leg) > 0.8
 
 
 def test_where_the_map_is_exact_places_decide(leg_and_rail, leg):
-    index = alike_voters(arrived(leg_and_rail, 0.001), leg_and_rail, leg)
+    index, _ = alike_voters(arrived(leg_and_rail, 0.001), leg_and_rail, leg)
     assert share_of_leg(index, leg) < 0.05
 
 
 def test_where_no_error_is_predicted_local_shapes_count(leg_and_rail, leg):
-    index = alike_voters(arrived(leg_and_rail, 0.0), leg_and_rail, leg)
-    expected = alike_voters(arrived(leg_and_rail, 0.025), leg_and_rail, leg)
+    index, _ = alike_voters(arrived(leg_and_rail, 0.0), leg_and_rail, leg)
+    expected, _ = alike_voters(arrived(leg_and_rail, 0.025), leg_and_rail, leg)
     np.testing.assert_array_equal(index, expected)
+
+
+def test_distances_of_alike_voters_are_in_position_and_normal(leg_and_rail, leg):
+    mapped = arrived(leg_and_rail, 0.05)
+    index, distance = alike_voters(mapped, leg_and_rail, leg)
+    assert index.shape == distance.shape == (1200, 7)
+    clouds = mapped.points, mapped.normals, leg.points, leg.normals
+    expected = all_distances(*clouds, 0.1).T[np.arange(1200)[:, None], index]
+    np.testing.assert_allclose(distance, expected, atol=1e-12)
 
 
 def test_no_more_alike_voters_than_there_are(leg):
     few = as_encoded(*box((0.2, 0.2, 0.2), 4))
-    index = alike_voters(arrived(few, 0.05), few, leg)
+    index, _ = alike_voters(arrived(few, 0.05), few, leg)
     assert (np.sort(index, axis=1) == np.arange(4)).all()

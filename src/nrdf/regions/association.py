@@ -58,15 +58,21 @@ def nearest_voters(
     return index, distance
 
 
-def alike_voters(mapped: MappedPoints, source: EncodedCloud, target: EncodedCloud) -> np.ndarray:
-    """The mapped points of a source that vote on each target point, (n, `VOTING_NEIGHBOURS`)
-    indices: nearest in position, normal and local shape."""
+def alike_voters(
+    mapped: MappedPoints, source: EncodedCloud, target: EncodedCloud
+) -> tuple[np.ndarray, np.ndarray]:
+    """The mapped points of a source that vote on each target point: nearest in position, normal
+    and local shape.
+
+    Returns the voters' indices (n, `VOTING_NEIGHBOURS`) and distances in position and normal.
+    """
     expected = float(mapped.error.mean())
     weight = _SHAPE_PER_ERROR * expected if expected > 0.0 else _SHAPE_WEIGHT
     shapes, target_shapes = source.alike_features(target)
     places = oriented_features(mapped.points, mapped.normals, NORMAL_WEIGHT)
     wanted = oriented_features(target.points, target.normals, NORMAL_WEIGHT)
-    tree = search_tree(np.concatenate([places, weight * shapes], axis=1))
-    count = np.arange(1, min(VOTING_NEIGHBOURS, len(places)) + 1)
-    asked = np.concatenate([wanted, weight * target_shapes], axis=1)
-    return np.asarray(tree.query(asked, k=count)[1])
+    index = search_tree(np.concatenate([places, weight * shapes], axis=1)).query(
+        np.concatenate([wanted, weight * target_shapes], axis=1),
+        k=np.arange(1, min(VOTING_NEIGHBOURS, len(places)) + 1),
+    )[1]
+    return index, np.linalg.norm(places[index] - wanted[:, None], axis=2)

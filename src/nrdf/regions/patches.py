@@ -26,7 +26,7 @@ _NEAREST = 7
 def explained_by(distance: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Which target points (n,) have a counterpart on the reference.
 
-    distance: (n, k) to the mapped points that vote on each (`association.nearest_voters`); error:
+    distance: (n, k) to the mapped points that vote on each (`association.alike_voters`); error:
     (n, k) that the field expects of these. A field that predicts no error explains all points.
     """
     expected = error.mean(axis=1)

@@ -264,13 +264,14 @@ class EncodedReference:
         self, chosen: dict[str, np.ndarray], target: EncodedCloud, mapped: MappedPoints
     ) -> dict[str, Match]:
         """Each target point joins a region by the votes of the mapped reference points that are
-        nearest and lie alike; what has none near it joins where it grows out of the region."""
+        nearest and lie alike; where these are far, only if it grows out of the region."""
+        voters, distance = alike_voters(mapped, self.encoded_cloud, target)
+        patches = find_patches(target.points, explained_by(distance, mapped.error[voters]))
+        # How far to trust a place is told by what is nearest, alike or not.
         nearest, distance = nearest_voters(
             mapped.points, mapped.normals, target.points, target.normals
         )
         trust = (mapped.trust[nearest] * np.exp(-distance / TRUST_SCALE)).mean(axis=1)
-        patches = find_patches(target.points, explained_by(distance, mapped.error[nearest]))
-        voters = alike_voters(mapped, self.encoded_cloud, target)
         matches = {}
         for name, indices in chosen.items():
             votes = self._working_mask(indices)[voters].mean(axis=1)

@@ -263,8 +263,8 @@ def _compose(
     """Panels with their titles above and the legend below, written to `path`."""
     header = 62 if any(panel.note for panel in panels) else 40
     width = size * len(rows[0])
-    footer = 24 + legend_height(colours, width) if colours else 10
-    sheet = Sheet(width, header + footer + sum(row[0].shape[0] for row in rows))
+    height = header + sum(row[0].shape[0] for row in rows) + legend_height(colours, width)
+    sheet = Sheet(width, height)
     for i, panel in enumerate(panels):
         x = (i + 0.5) * width / len(panels)
         sheet.write(panel.title, x, 12, 18, bold=True)

@@ -21,6 +21,7 @@ from nrdf.io.atomic import write_atomically
 DARK, GREY = "#222", "#666"  # of titles, and of notes
 _LEGEND_ROW = 26  # pixels
 _LEGEND_TEXT = 16
+_EDGE = 12  # above a legend, and below what stands last
 _SWATCH, _GAP, _APART = 18, 8, 26  # a colour's side, its distance from the name, from the next
 
 
@@ -62,7 +63,7 @@ class Sheet:
         `legend_height` says."""
         font = _font(_LEGEND_TEXT, False)
         rows = _legend_rows(list(colours), self._image.width)
-        y = self._image.height - _LEGEND_ROW * len(rows)
+        y = self._image.height - _EDGE // 2 - _LEGEND_ROW * len(rows)
         for row in rows:
             x = max(_GAP, (self._image.width - sum(map(_entry_width, row)) + _APART) / 2)
             for name in row:
@@ -82,8 +83,8 @@ class Sheet:
 
 
 def legend_height(colours: Mapping[str, np.ndarray], width: int) -> int:
-    """Pixels that a legend of these colours takes at the lower edge of a picture so wide."""
-    return _LEGEND_ROW * len(_legend_rows(list(colours), width))
+    """Pixels to leave for a legend of these colours at the lower edge of a picture so wide."""
+    return _EDGE + (_EDGE + _LEGEND_ROW * len(_legend_rows(list(colours), width))) * bool(colours)
 
 
 def png_of(image: np.ndarray) -> memoryview:

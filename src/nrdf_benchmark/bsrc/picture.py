@@ -61,8 +61,7 @@ def _compose(
     heights = [view[0].shape[0] for view in views]
     size, columns = views[0][0].shape[1], len(panels)
     width = columns * size + _LABELS
-    footer = 24 + legend_height(colours, width)
-    sheet = Sheet(width, _HEADER + footer + 2 * sum(heights))
+    sheet = Sheet(width, _HEADER + 2 * sum(heights) + legend_height(colours, width))
     sheet.write(title, width / 2, 10, 19, bold=True)
     heads = ["reference", *notes]
     for column, (panel, note) in enumerate(zip(panels, heads, strict=True)):

@@ -9,6 +9,7 @@ import pytest
 from builders.bsrc_folder import member_clouds, write_bsrc
 from nrdf.errors import OutputError
 from nrdf.viz.palette import region_colours
+from nrdf.viz.sheet import legend_height
 from nrdf_benchmark.bsrc import picture as module
 from nrdf_benchmark.bsrc.dataset import read_bsrc
 from nrdf_benchmark.bsrc.picture import draw_comparison
@@ -45,9 +46,10 @@ def test_retrieved_regions_are_above_the_true_ones(benchmark, tmp_path):
     assert all(reference is first.cloud for reference, _ in asked)
     assert image.shape[1] == 3 * 160 + module._LABELS
     # Above the legend, the targets' columns hold one line of retrieved and one of true regions.
-    body = image[module._HEADER : -module._FOOTER, 160 + module._LABELS :]
-    lines = np.array_split(body, 4 if len(body) > 700 else 2)
     colours = region_colours(benchmark.rois)
+    legend = legend_height(colours, image.shape[1])
+    body = image[module._HEADER : -legend, 160 + module._LABELS :]
+    lines = np.array_split(body, 4 if len(body) > 700 else 2)
     counts = np.array([[like(line, c) for c in colours.values()] for line in lines])
     retrieved, true = counts[0::2].sum(0), counts[1::2].sum(0)
     assert retrieved[0] > 0 and true[0] > 0
