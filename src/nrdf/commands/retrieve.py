@@ -81,7 +81,8 @@ def retrieve(
         target: Cloud or mesh of the object to find them on, in the same frame, or in any with --up;
             any unit.
         out: Folder to write; regions-NAME, by the target's name, unless given.
-        method: mask: k-nearest voting: the mapped reference points nearest to each target point;
+        method: mask: k-nearest voting: the mapped reference points nearest to each target point,
+            and alike in how the surface lies;
             points: each region point's prediction is snapped to the target (the paper's).
         refine: Move the mapped reference onto the target in a few steps first, about half a second
             more.

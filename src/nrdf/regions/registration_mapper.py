@@ -3,7 +3,8 @@
 A subset of the source is moved onto the target, and all other points go along with their nearest of
 the subset. The same is done the other way round, from the target to the source. Two things tell
 where the map can be believed: how far a mapped point is from the target in position and normal,
-and how far from its own place it comes back to.
+and how far from its own place it comes back to. Neighbours are near in local shape as well
+(`nrdf.geometry.local_shape`), so that a leg is matched to legs.
 
 Registration alone begins half-way to the target's bounding box (the model `registration`). With the
 general field it begins where that puts the points, and the error that the field expects tells what

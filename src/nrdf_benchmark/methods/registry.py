@@ -53,7 +53,9 @@ METHODS = {
     "box-normals": Entry("box, snapped with oriented normals"),
     "box-mask": Entry("box, region as a mask"),
     "registration": Entry("smooth non-rigid registration with normals, region as a mask"),
-    "registration-model": Entry("the same as the model of any category, absent regions left out"),
+    "registration-model": Entry(
+        "the model of any category: by local shape too, absent regions left out"
+    ),
     "general": Entry("the general field, then registration from there", "general", None, True),
     "ndf": Entry("NDF, nearest descriptor", "ndf", "ndf"),
     "ndf-energy": Entry("NDF, iterative energy minimisation", "ndf", "ndf"),
