@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 _RADIUS = 0.05  # around a point, canonical length
@@ -31,14 +32,12 @@ def local_shapes(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     nearest = cKDTree(place).query(
         place, np.arange(1, min(_CELLS, len(place)) + 1), distance_upper_bound=_RADIUS
     )[1]
-    there = (nearest < len(place)).astype(np.float64)
-    weight = there / there.sum(axis=1, keepdims=True)
-    nearest[nearest == len(place)] = 0
-    offset = place[nearest] - place[:, None]
-    middle = np.einsum("nk,nka->na", weight, offset)
-    squares = np.einsum("nk,nka,nkb->nab", weight, offset, offset, optimize=True)
-    covariance = squares[:, _ROWS, _COLUMNS] - middle[:, _ROWS] * middle[:, _COLUMNS]
-    tensor = np.einsum("nk,nka->na", weight, spread[nearest])
+    there = nearest < len(place)
+    first = np.concatenate([[0], np.cumsum(there.sum(axis=1))])
+    beside = csr_matrix((np.ones(first[-1]), nearest[there], first), (len(place), len(place)))
+    moments = np.concatenate([place, place[:, _ROWS] * place[:, _COLUMNS], spread], axis=1)
+    middle, squares, tensor = np.split((beside @ moments) / np.diff(first)[:, None], [3, 9], axis=1)
+    covariance = squares - middle[:, _ROWS] * middle[:, _COLUMNS]
     shapes = np.concatenate([tensor, 3.0 / _RADIUS**2 * covariance], axis=1)
     return (np.tile(_TWICE, 2) * shapes)[owner]
 
@@ -47,7 +46,7 @@ def telling_directions(shapes: np.ndarray) -> np.ndarray:
     """The three directions (12, 3) in which local shapes (n, 12) differ most.
 
     Projected on them, the shapes of a chair keep nine tenths of their variance, and nearest
-    neighbours are found in half the time.
+    neighbours are found in three fifths of the time.
     """
     centred = shapes - shapes.mean(axis=0)
     return np.linalg.eigh(centred.T @ centred)[1][:, :-4:-1]
