@@ -219,7 +219,9 @@ def test_a_field_that_doubts_lowers_the_confidence(reference):
     absent = model.set_reference(cloud).retrieve(masks["seat"], cloud)
     assert sure.score > 1.1 * unsure.score > 0 and absent.score < MIN_CONFIDENCE
     assert len(absent.indices) > 0  # doubtful, not emptied: what was found leads back
-    assert overlap(unsure.indices, np.isin(np.arange(COUNT), sure.indices)) > 0.93
+    # Who votes depends on the error that is expected, but not on whether the points exist.
+    np.testing.assert_array_equal(unsure.indices, absent.indices)
+    assert overlap(unsure.indices, np.isin(np.arange(COUNT), sure.indices)) > 0.99
 
 
 def test_a_part_that_the_reference_lacks_is_in_no_region(taught, reference):

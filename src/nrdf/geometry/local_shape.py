@@ -11,7 +11,7 @@ _CELL = 0.02  # points in one cell of that size share a local shape
 _CELLS = 32  # nearest cells that are looked at; a plane has 20 within the radius
 # The nine entries of a symmetric 3 x 3 matrix as six, with the same distance between two of them.
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
-_TWICE = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))
+_ENTRY_WEIGHT = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))
 
 
 def local_shapes(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -39,7 +39,7 @@ def local_shapes(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     middle, squares, tensor = np.split((beside @ moments) / np.diff(first)[:, None], [3, 9], axis=1)
     covariance = squares - middle[:, _ROWS] * middle[:, _COLUMNS]
     shapes = np.concatenate([tensor, 3.0 / _RADIUS**2 * covariance], axis=1)
-    return (np.tile(_TWICE, 2) * shapes)[owner]
+    return (np.tile(_ENTRY_WEIGHT, 2) * shapes)[owner]
 
 
 def telling_directions(shapes: np.ndarray) -> np.ndarray:

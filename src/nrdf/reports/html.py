@@ -94,7 +94,7 @@ def _templates() -> Environment:
     )
 
 
-def _data_source(content: bytes | memoryview, kind: str) -> str:
+def _data_source(content: bytes, kind: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
 
 

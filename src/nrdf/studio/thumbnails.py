@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from PIL import Image
 
 from nrdf.reports.job_folder import panel_of
 from nrdf.studio.model.result_cache import TargetResult
 from nrdf.viz.picture import render_panels
+from nrdf.viz.sheet import png_of
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +59,5 @@ class Thumbnails:
         except Exception:  # a picture less is no reason to stop
             log.exception("no thumbnail of %s", name)
             return
-        content = io.BytesIO()
-        Image.fromarray((255 * rows[0][0]).clip(0, 255).astype("uint8")).save(content, "PNG")
-        self._drawn[name] = stamp, content.getvalue()
+        self._drawn[name] = stamp, png_of(rows[0][0])
         self._ready()

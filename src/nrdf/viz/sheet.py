@@ -79,20 +79,21 @@ class Sheet:
 
         Raises OutputError if it cannot be written, or for an ending that no format has.
         """
-        write_atomically(path, [encoded(self._image, path.suffix or ".png")])
+        write_atomically(path, [_encoded(self._image, path.suffix or ".png")])
 
 
 def legend_height(colours: Mapping[str, np.ndarray], width: int) -> int:
     """Pixels to leave for a legend of these colours at the lower edge of a picture so wide."""
-    return _EDGE + (_EDGE + _LEGEND_ROW * len(_legend_rows(list(colours), width))) * bool(colours)
+    rows = len(_legend_rows(list(colours), width))
+    return _EDGE + (_EDGE + _LEGEND_ROW * rows if rows else 0)
 
 
-def png_of(image: np.ndarray) -> memoryview:
+def png_of(image: np.ndarray) -> bytes:
     """A picture (h, w, 3) in [0, 1] as a PNG file's content."""
-    return encoded(_as_image(image), ".png")
+    return _encoded(_as_image(image), ".png")
 
 
-def encoded(image: Image.Image, ending: str) -> memoryview:
+def _encoded(image: Image.Image, ending: str) -> bytes:
     """A picture as the content of a file with that ending. Raises OutputError for one that no
     picture has."""
     Image.preinit()  # the usual formats; all of Pillow's take longer
@@ -101,11 +102,11 @@ def encoded(image: Image.Image, ending: str) -> memoryview:
         raise OutputError(f"no picture can be written as '{ending}'; use .png or .jpg")
     file = io.BytesIO()
     image.save(file, kind, compress_level=4)
-    return file.getbuffer()
+    return file.getvalue()
 
 
 def _as_image(image: np.ndarray) -> Image.Image:
-    return Image.fromarray((255 * image).astype(np.uint8))
+    return Image.fromarray((255 * image).clip(0, 255).astype(np.uint8))
 
 
 def _legend_rows(names: list[str], width: int) -> list[list[str]]:
